@@ -20,7 +20,7 @@ from nldyn.branches.branch import Branch as Branch
 from nldyn.branches.cascades import Cascade as Cascade
 from nldyn.branches.cascades import cascade as cascade
 from nldyn.branches.continuation import continue_branch as continue_branch
-from nldyn.branches.options import ContinuationOptions as ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions as ContinuationOptions
 
 # curves
 from nldyn.curves.curves import Curve as Curve
@@ -98,21 +98,21 @@ from nldyn.search.pseudo_orbits import PseudoOrbits as PseudoOrbits
 from nldyn.search.random_walks import ClosedWalks as ClosedWalks
 
 # system
-from nldyn.system.elements import BaseMotion as BaseMotion
-from nldyn.system.elements import ConstantForce as ConstantForce
-from nldyn.system.elements import Damper as Damper
-from nldyn.system.elements import HarmonicForce as HarmonicForce
-from nldyn.system.elements import Stop as Stop
-from nldyn.system.elements import Unbalance as Unbalance
-from nldyn.system.elements import dashpot_for as dashpot_for
-from nldyn.system.elements import dissipation_for as dissipation_for
-from nldyn.system.elements import hertz_stiffness as hertz_stiffness
+from nldyn.system.loads import BaseMotion as BaseMotion
+from nldyn.system.loads import ConstantForce as ConstantForce
+from nldyn.system.loads import HarmonicForce as HarmonicForce
+from nldyn.system.loads import Unbalance as Unbalance
 from nldyn.system.measured import MeasuredForce as MeasuredForce
 from nldyn.system.measured import measured_force as measured_force
 from nldyn.system.parameters import Parameter as Parameter
 from nldyn.system.rigid_stop import RigidStop as RigidStop
 from nldyn.system.spin import Spin as Spin
-from nldyn.system.springs import CubicDamper as CubicDamper
-from nldyn.system.springs import PolynomialSpring as PolynomialSpring
-from nldyn.system.springs import Spring as Spring
+from nldyn.system.springs_dampers import CubicDamper as CubicDamper
+from nldyn.system.springs_dampers import Damper as Damper
+from nldyn.system.springs_dampers import PolynomialSpring as PolynomialSpring
+from nldyn.system.springs_dampers import Spring as Spring
+from nldyn.system.stop import Stop as Stop
+from nldyn.system.stop import dashpot_for as dashpot_for
+from nldyn.system.stop import dissipation_for as dissipation_for
+from nldyn.system.stop import hertz_stiffness as hertz_stiffness
 from nldyn.system.system import System as System

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from nldyn.bifurcations.critical import Estimate
+from nldyn.bifurcations.normal_form_coefficients import Estimate
 from nldyn.bifurcations.normal_forms import NormalForm
 from nldyn.branches.endings import StopReason
 from nldyn.orbits.multipliers import Stability

@@ -1,10 +1,11 @@
 """Systems that many tests compute."""
 
 import numpy as np
+from hypothesis import strategies as st
 from scipy import sparse
 
 import cms
-from nldyn import HarmonicForce, LoadCase, Stop, System, Unbalance
+from nldyn import Damper, HarmonicForce, LoadCase, Stop, System, Unbalance
 
 RANGE_HZ = (5.7, 90.0)
 THREE_HZ = (36.0, 38.5)  # where there are branches of three periods up to 3
@@ -32,6 +33,26 @@ def between_stops(mismatch: float = 0.0) -> System:
     return System.from_modal(
         [13.13], {"m": [0.635]}, modal_damping=0.02, stops=stops, excitation=unbalance
     )
+
+
+THREE_MODES_HZ = [13.1, 117.5, 326.5]
+THREE_MODES_AT = {"middle": [0.63, 0.8, -0.5], "end": [-0.4, 0.9, 0.7]}
+
+
+def three_modes(**changes) -> System:
+    elements = {
+        "modal_damping": 0.01,
+        "stops": [Stop("middle", stiffness=5e9)],
+        "dampers": [Damper("end", 6.0)],
+        "excitation": [Unbalance("middle", 5e-6)],
+        **changes,
+    }
+    return System.from_modal(THREE_MODES_HZ, THREE_MODES_AT, **elements)
+
+
+THREE_MODES_STATES = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6).map(
+    lambda values: np.array(values) * [5e-6, 2e-6, 1e-6, 4e-3, 4e-3, 4e-3]
+)
 
 
 MASSES, MASS, SPRING = 41, 0.05, 141000.0

@@ -11,7 +11,8 @@ from nldyn.longterm.lyapunov import lyapunov_exponents
 from nldyn.longterm.simulation import simulate
 from nldyn.orbits.solve import solve_orbit
 from nldyn.runtime.compilation import compilations
-from nldyn.system.elements import Stop, Unbalance
+from nldyn.system.loads import Unbalance
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 

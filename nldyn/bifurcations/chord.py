@@ -10,7 +10,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, SHORTEST_CROSSING
-from nldyn.bifurcations.critical import correct_across
+from nldyn.bifurcations.normal_form_coefficients import correct_across
 from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.sign_changes import crosses
 from nldyn.orbits.conditions import TOUCH, depth_row

@@ -16,7 +16,7 @@ from nldyn.bifurcations.branch_crossing import (
     true_crossing,
 )
 from nldyn.bifurcations.chord import BESIDE, Chord
-from nldyn.bifurcations.critical import turns_near_crossing
+from nldyn.bifurcations.normal_form_coefficients import turns_near_crossing
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import (

@@ -19,7 +19,7 @@ from nldyn.base.errors import (
     check_positive,
     check_types,
 )
-from nldyn.bifurcations.critical import (
+from nldyn.bifurcations.normal_form_coefficients import (
     CoefficientError,
     Coefficients,
     Crossing,
@@ -63,9 +63,10 @@ class NormalForm:
         The same in plain words.
     coefficient : Estimate, optional
         Of the normal form, for ξ in units of the orbit's size (see
-        `nldyn.bifurcations.critical`): a of a fold, c of a flip or pitchfork, the first Lyapunov
-        coefficient of a torus, ⟨p, B(q, q)⟩ of a transcritical point; of a rigid grazing the
-        product in m/s of the speed of the slight impact and the multiplier that it makes grow.
+        `nldyn.bifurcations.normal_form_coefficients`): a of a fold, c of a flip or pitchfork, the
+        first Lyapunov coefficient of a torus, ⟨p, B(q, q)⟩ of a transcritical point; of a rigid
+        grazing the product in m/s of the speed of the slight impact and the multiplier that it
+        makes grow.
     frequency_shift : Estimate, optional
         (f - f₀)/(f₀ ξ²) of the orbits that meet or are born here; of a rigid grazing
         (f - f₀)/(f₀ v) in s/m with the speed v of the slight impact.

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.bifurcations.critical import CoefficientError
+from nldyn.bifurcations.normal_form_coefficients import CoefficientError
 from nldyn.flow.flow_map import Segments
 from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit

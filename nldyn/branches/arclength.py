@@ -25,8 +25,8 @@ from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.sign_changes import crosses
 from nldyn.bifurcations.touching import rigid_grazing
 from nldyn.branches.endings import Ending, StopReason
-from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.predictor import predicted
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.bordered import Free, OrbitFamily, correct, length_unit
 from nldyn.orbits.conditions import TOUCH, depth_row
 from nldyn.orbits.impact_phases import nodes_to_impacts, start_far_from_impacts
@@ -231,9 +231,7 @@ class Stepper:
             bent = step <= KINK and (
                 point.orbit.impacts != here.orbit.impacts or point.orbit.system.jumps
             )
-            growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
-            growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
-            step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
+            step = self.options.next_step(step, angle, miss)
             trail = np.vstack([here.orbit.point, here.tangent, behind])
             behind = trail[: 0 if bent else 2 * MOST_BEHIND]
             self.stride = StepperState(point, step, behind, self.stride.count + 1)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-    from nldyn.branches.options import ContinuationOptions
+    from nldyn.branches.step_control import ContinuationOptions
 
 
 def check_branches(name: str, branches: object) -> None:

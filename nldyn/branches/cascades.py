@@ -9,7 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nldyn.base.errors import LocateError, SystemModelError, check_range, check_types, check_whole
-from nldyn.bifurcations.critical import CoefficientError, Estimate, doubled_parameter, flip, loop_of
+from nldyn.bifurcations.normal_form_coefficients import (
+    CoefficientError,
+    Estimate,
+    doubled_parameter,
+    flip,
+    loop_of,
+)
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special, is_at
 from nldyn.bifurcations.within_step import special_points_between
@@ -17,7 +23,7 @@ from nldyn.branches.arclength import Stepper
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.branches.continuation import make_branch
 from nldyn.branches.endings import Ending
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 
 FEIGENBAUM = 4.669201609102991  # limit of the ratios, Feigenbaum (1978)
 POINTS_BETWEEN = 8  # of a doubled branch up to its flip, if that lies where it is expected

@@ -25,7 +25,7 @@ from nldyn.branches.branch import (
 from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_at
 from nldyn.branches.endings import Ending, StopReason, StopReasons
 from nldyn.branches.leg import Leg, LegBuilder
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.prefetch import Ahead
 from nldyn.orbits.orbit import Orbit, check_minimal

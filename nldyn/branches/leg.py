@@ -19,7 +19,7 @@ from nldyn.bifurcations.within_step import insert_dip, special_points_between
 from nldyn.branches.arclength import Stepper, StepperState
 from nldyn.branches.branch import WalkEnd
 from nldyn.branches.endings import Ending, StopReason
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.conditions import nearest_grazing
 from nldyn.orbits.shooting import metric_length
 

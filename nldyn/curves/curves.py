@@ -24,7 +24,7 @@ from nldyn.base.errors import (
 from nldyn.bifurcations.point import check_special
 from nldyn.bifurcations.roots import root
 from nldyn.branches.endings import Ending, StopReasons, has_ending
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.branches.tables import orbit_columns
 from nldyn.curves.marks import (
     CurveChord,

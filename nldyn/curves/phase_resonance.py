@@ -15,7 +15,7 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, check_whole
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.curves.curves import Curve, CurveFile, continue_constant
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.orbits.bordered import OrbitFamily, correct

@@ -15,7 +15,7 @@ from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.bifurcations.period_doubling import passed_flip
 from nldyn.branches.arclength import GRAZES, SLIGHTEST, grazes_rigid, loses_impact
 from nldyn.branches.endings import Ending, StopReason
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.curves.codimension_two import codimension_tests, cosine_near, is_torus, torus_cosine
 from nldyn.orbits.bordered import (
     SHORTEST_DIFFERENCE,
@@ -467,9 +467,7 @@ class CurveWalk:
             if there.corner or clear_of_nodes(here, there)[0] is not here:
                 curvature = np.zeros(here.tangent.size)
             here = there
-            growth = 0.7 * self.options.max_angle / max(angle, 1e-3)
-            growth = min(growth, math.sqrt(0.5 * self.options.max_miss / max(miss, 1e-6)))
-            step = min(step * min(max(growth, 0.5), 1.6), self.options.max_step)
+            step = self.options.next_step(step, angle, miss)
         self.stop_reason = Ending.MOST_POINTS.told(points=self.options.max_points)
 
     def _advance(

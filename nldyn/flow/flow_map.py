@@ -50,10 +50,10 @@ from nldyn.flow.packing import bond_row, parameter_tables, stop_row
 from nldyn.runtime.interruption import behind
 from nldyn.runtime.kernel_cache import first_call
 from nldyn.system.contact_law import law_address
-from nldyn.system.elements import Stop
 from nldyn.system.linear import ForcedResponse
 from nldyn.system.parameters import Parameter
 from nldyn.system.ride import Ride
+from nldyn.system.stop import Stop
 from nldyn.system.system import Clock, System, same_system
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]

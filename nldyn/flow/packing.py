@@ -16,7 +16,7 @@ from nldyn.flow.options import FlowOptions
 from nldyn.system.contact_law import duration_factor
 from nldyn.system.parameters import OF_SPRINGS, OF_STOPS, Parameter, check_exact
 from nldyn.system.rigid_stop import AnyStop, RigidStop
-from nldyn.system.springs import Bond
+from nldyn.system.springs_dampers import Bond
 from nldyn.system.system import System
 
 _NO_STOP = StopRow(0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0)  # what has no elastic contact

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.flow.flow_map import Trajectory
-from nldyn.system.elements import Stop
 from nldyn.system.rigid_stop import RigidStop
+from nldyn.system.stop import Stop
 
 SHUT = 1e-13  # of the displacements that add up to that at a stop: a gap counts as closed
 STILL = 1e-9  # of the largest speed at a stop: one that counts as none

@@ -26,7 +26,7 @@ from nldyn.branches.branch import Branch, Course, WalkEnd
 from nldyn.branches.checkpoint import Tally
 from nldyn.branches.continuation import alike
 from nldyn.branches.endings import StopReason
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.branches.tables import UNITS, orbit_columns
 from nldyn.flow.flow_map import FlowMap, Trajectory, same_flow
 from nldyn.flow.kernels.layout import Record

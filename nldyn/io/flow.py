@@ -16,20 +16,19 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.io.hdf5 import Group, put, set_attribute
 from nldyn.system.contact_law import ContactLaw
-from nldyn.system.elements import (
-    BaseMotion,
-    ConstantForce,
-    Damper,
-    Excitation,
-    HarmonicForce,
-    Stop,
-    Unbalance,
-)
 from nldyn.system.linear import LinearPart
+from nldyn.system.loads import BaseMotion, ConstantForce, Excitation, HarmonicForce, Unbalance
 from nldyn.system.parameters import strength
 from nldyn.system.rigid_stop import TRIED_SPEEDS, AnyStop, Restitution, RigidStop
 from nldyn.system.spin import Spin
-from nldyn.system.springs import LARGEST_DEGREE, CubicDamper, PolynomialSpring, Spring
+from nldyn.system.springs_dampers import (
+    LARGEST_DEGREE,
+    CubicDamper,
+    Damper,
+    PolynomialSpring,
+    Spring,
+)
+from nldyn.system.stop import Stop
 from nldyn.system.system import AnyDamper, AnySpring, System
 
 TRIALS = ((0.1, 0.0), (1.0, 0.1), (1.0, -0.1))  # penetration over its unit, speed in m/s

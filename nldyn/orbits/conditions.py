@@ -27,9 +27,10 @@ from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.passage import Passage, peak_past
 from nldyn.orbits.shooting import metric_length
 from nldyn.system.chart import FREQUENCY, Chart
-from nldyn.system.elements import BaseMotion, ConstantForce, HarmonicForce, Stop, Unbalance
+from nldyn.system.loads import BaseMotion, ConstantForce, HarmonicForce, Unbalance
 from nldyn.system.parameters import Parameter
 from nldyn.system.rigid_stop import RigidStop
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 KINDS = ("LP", "PD", "NS", "BP", "GR")

@@ -33,8 +33,8 @@ from nldyn.orbits.multipliers import (
     uncertainties,
 )
 from nldyn.orbits.shooting import ShootingProblem
-from nldyn.system.elements import Stop
 from nldyn.system.rigid_stop import AnyStop, RigidStop
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 SAME_PHASE = 1e-9  # in rad: an extreme and an impact

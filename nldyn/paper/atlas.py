@@ -16,7 +16,7 @@ from pathlib import Path
 
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import broken_off
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.paper.jobs import scene_system
 from nldyn.paper.kept import stamp
 from nldyn.paper.starts import follow_starts, longest_whole, read_starts

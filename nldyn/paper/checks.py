@@ -28,7 +28,7 @@ from nldyn.paper.jobs import BILINEAR_ALPHA, HERTZ_STIFFNESS, STIFFNESS
 from nldyn.scene.component import build_component
 from nldyn.scene.read import load_scene
 from nldyn.search.diagram import Diagram
-from nldyn.system.elements import hertz_stiffness
+from nldyn.system.stop import hertz_stiffness
 
 Results = Mapping[str, Diagram]
 Check = Callable[[Results], Finding]

@@ -12,8 +12,8 @@ import cms
 from nldyn.base.resources import example
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch
-from nldyn.branches.options import ContinuationOptions
 from nldyn.branches.predictor import predicted
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import Trajectory, flow_of
 from nldyn.longterm.attractors import AttractorOptions, classify_attractor
 from nldyn.orbits.multipliers import floquet_spectrum
@@ -29,7 +29,7 @@ from nldyn.scene.build import build_system
 from nldyn.scene.component import build_component
 from nldyn.scene.read import load_scene
 from nldyn.search.diagram import Collector, Diagram, SubharmonicSeed, diagram
-from nldyn.system.elements import Stop
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 BILINEAR_ALPHA = 790.0  # section 3, from equation 3.2

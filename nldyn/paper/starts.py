@@ -19,7 +19,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_frequency, check_whole, numbers
 from nldyn.branches.branch import Branch
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import flow_of
 from nldyn.io.store import save
 from nldyn.orbits.orbit import Orbit, check_observe, stroboscopic

@@ -12,7 +12,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
 from nldyn.reduction.load_case import LoadCase
 from nldyn.system.contact_law import duration_factor
-from nldyn.system.elements import Stop
+from nldyn.system.stop import Stop
 from nldyn.system.system import AnyDamper, AnySpring, System
 
 INVISIBLE = 1e-6

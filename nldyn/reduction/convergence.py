@@ -25,8 +25,7 @@ from nldyn.reduction.load_case import LoadCase
 from nldyn.runtime.executors import as_finished, own_processes
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.runtime.threads import one_thread
-from nldyn.system.elements import Damper
-from nldyn.system.springs import Spring
+from nldyn.system.springs_dampers import Damper, Spring
 from nldyn.system.system import System
 
 if TYPE_CHECKING:

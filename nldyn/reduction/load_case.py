@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from nldyn.base.errors import SystemModelError, check_frequency
-from nldyn.system.elements import Excitation, Stop
+from nldyn.system.loads import Excitation
 from nldyn.system.spin import Spin
+from nldyn.system.stop import Stop
 from nldyn.system.system import AnyDamper, AnySpring, System
 
 if TYPE_CHECKING:

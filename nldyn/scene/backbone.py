@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from nldyn.base.errors import SystemModelError
 from nldyn.branches.backbone import Backbone, backbone
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.curves.curves import Curve
 from nldyn.curves.phase_resonance import phase_resonance, strength_of
 from nldyn.orbits.conditions import driving_source

@@ -22,13 +22,13 @@ from nldyn.reduction.load_case import system_of_reduced
 from nldyn.runtime.progress import Progress
 from nldyn.scene.checks import check_ratio_count
 from nldyn.scene.component import build_component
-from nldyn.scene.elements import Acting, acting_elements
 from nldyn.scene.faults import told_as, within_component
 from nldyn.scene.load_case import load_case_of
 from nldyn.scene.matrices import build_matrices, skew_matrices
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import Scene
-from nldyn.system.elements import BaseMotion
+from nldyn.scene.stops_and_loads import Acting, acting_elements
+from nldyn.system.loads import BaseMotion
 from nldyn.system.spin import Spin
 from nldyn.system.system import System
 

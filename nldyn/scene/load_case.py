@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from nldyn.reduction.load_case import LoadCase
 from nldyn.scene.checks import check_computable
-from nldyn.scene.elements import acting_elements
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import Scene
+from nldyn.scene.stops_and_loads import acting_elements
 
 
 def load_case_of(scene: Scene) -> LoadCase:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from nldyn.base.errors import SystemModelError
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.io.checkpoint import CheckpointFile

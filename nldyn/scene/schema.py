@@ -25,8 +25,9 @@ from pydantic import (
 
 from nldyn.base.errors import LARGEST_FREQUENCY
 from nldyn.scene.messages import quoted, show
-from nldyn.system.elements import LARGEST_EXPONENT, LARGEST_PHASE, MOST_HARMONIC
-from nldyn.system.springs import LARGEST_DEGREE
+from nldyn.system.loads import LARGEST_PHASE, MOST_HARMONIC
+from nldyn.system.springs_dampers import LARGEST_DEGREE
+from nldyn.system.stop import LARGEST_EXPONENT
 
 SMALLEST, LARGEST = 1e-50, 1e50
 

@@ -29,7 +29,7 @@ from nldyn.base.errors import (
 from nldyn.base.version import software_version
 from nldyn.runtime.executors import as_finished, check_execution
 from nldyn.scene.build import build_system
-from nldyn.scene.case_keys import case_keys
+from nldyn.scene.case_fingerprints import case_fingerprints
 from nldyn.scene.read import load_scene, scene_from_tables
 from nldyn.scene.schema import Scene
 from nldyn.system.system import System
@@ -136,7 +136,7 @@ def parameter_study(
     label = f"{getattr(measure, '__module__', '')}.{getattr(measure, '__qualname__', measure)}"
     keys, done = [str(k) for k in range(len(cases))], {}
     if keep is not None:
-        keys = case_keys(cases, scene.file.parent, measure, keep_name)
+        keys = case_fingerprints(cases, scene.file.parent, measure, keep_name)
         done = _read(keep)
         _check_writable(keep)
     waiting = [k for k, key in enumerate(keys) if key not in done]

@@ -41,7 +41,7 @@ from nldyn.branches.continuation import (
     walked_leg,
 )
 from nldyn.branches.endings import Ending
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.branches.tables import Part, to_pandas, to_xarray
 from nldyn.flow.flow_map import FlowMap, flow_of, same_flow
 from nldyn.flow.prefetch import Ahead, Task, computing_ahead

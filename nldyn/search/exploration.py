@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_whole, is_finite, shown
-from nldyn.branches.options import MOST_POINTS, ContinuationOptions
+from nldyn.branches.step_control import MOST_POINTS, ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, same_flow
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import MOST_COUNT, settling_periods

@@ -22,7 +22,7 @@ from nldyn.base.errors import (
 )
 from nldyn.branches.branch import Branch
 from nldyn.branches.checkpoint import Checkpoint
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.flow.prefetch import computing_ahead
 from nldyn.orbits.deflation import deflated_orbit

@@ -16,7 +16,7 @@ from nldyn.base.errors import SystemModelError, check_range, check_types, check_
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.branches.checkpoint import BranchFile, Tally, checkpoint_of_several
 from nldyn.branches.continuation import extended
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import MOST_COUNT

@@ -16,7 +16,6 @@ from nldyn.base.errors import (
     is_finite,
     shown,
 )
-from nldyn.system.elements import LARGEST_EXPONENT
 from nldyn.system.parameters import (
     OF_SPRINGS,
     OF_STOPS,
@@ -25,7 +24,8 @@ from nldyn.system.parameters import (
     check_exact,
     check_index,
 )
-from nldyn.system.springs import PolynomialSpring
+from nldyn.system.springs_dampers import PolynomialSpring
+from nldyn.system.stop import LARGEST_EXPONENT
 from nldyn.system.system import System
 
 FREQUENCY = "frequency_hz"

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, check_whole, numbers
-from nldyn.system.elements import ConstantForce, Excitation, HarmonicForce
+from nldyn.system.loads import ConstantForce, Excitation, HarmonicForce
 
 NONE_LEFT = 1e-14  # share of the largest amplitude that rounding of the samples may be
 SAME = 1e-9  # share of the largest deviation from the mean below which two samples are equal

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from nldyn.base.errors import SystemModelError, check_types, check_whole
-from nldyn.system.elements import Excitation
+from nldyn.system.loads import Excitation
 from nldyn.system.rigid_stop import RigidStop
-from nldyn.system.springs import LARGEST_DEGREE, PolynomialSpring
+from nldyn.system.springs_dampers import LARGEST_DEGREE, PolynomialSpring
 from nldyn.system.system import System
 
 OF_STOPS = ("gap", "stiffness", "exponent", "dissipation", "dashpot", "restitution")

@@ -9,9 +9,9 @@ import numpy as np
 from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError
 from nldyn.system.contact_law import power_law
-from nldyn.system.elements import Stop
 from nldyn.system.rigid_stop import RigidStop
-from nldyn.system.springs import Bond
+from nldyn.system.springs_dampers import Bond
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 MOST_STEPS = 200

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from nldyn.base.arrays import Complex, Real
-from nldyn.system.elements import BaseMotion
+from nldyn.system.loads import BaseMotion
 
 
 class Ride(NamedTuple):

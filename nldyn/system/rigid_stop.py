@@ -10,7 +10,8 @@ from typing import Any
 
 from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.system.contact_law import ContactLaw
-from nldyn.system.elements import Stop, check_sides
+from nldyn.system.stop import Stop
+from nldyn.system.values import check_sides
 
 Restitution = Callable[[float], tuple[float, float]]
 TRIED_SPEEDS = tuple(10.0**k for k in range(-12, 4))  # m/s

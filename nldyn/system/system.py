@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 
 from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError, is_finite, numbers, shown
-from nldyn.system.elements import BaseMotion, Damper, Excitation, HarmonicForce, Stop
 from nldyn.system.linear import (
     ForcedResponse,
     LinearPart,
@@ -24,10 +23,19 @@ from nldyn.system.linear import (
     linear_part,
     without_rounding,
 )
+from nldyn.system.loads import BaseMotion, Excitation, HarmonicForce
 from nldyn.system.ride import Ride
 from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.spin import Spin, same_spin, skew
-from nldyn.system.springs import Bond, CubicDamper, PolynomialSpring, Spring, bonds_of
+from nldyn.system.springs_dampers import (
+    Bond,
+    CubicDamper,
+    Damper,
+    PolynomialSpring,
+    Spring,
+    bonds_of,
+)
+from nldyn.system.stop import Stop
 
 Element = TypeVar("Element")
 AnySpring = Spring | PolynomialSpring

@@ -21,7 +21,7 @@ import mpmath
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.system.elements import HarmonicForce, Unbalance
+from nldyn.system.loads import HarmonicForce, Unbalance
 from nldyn.system.system import System
 
 mp = mpmath.mp

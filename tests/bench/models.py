@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.system.elements import Stop, Unbalance
+from nldyn.system.loads import Unbalance
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 MODELS = ("one_dof", "two_dof", "four_dof", "sixteen_dof")

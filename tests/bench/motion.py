@@ -16,7 +16,7 @@ from numba import njit
 
 from bench.models import Sensitivities
 from nldyn.base.arrays import Real
-from nldyn.system.elements import Unbalance
+from nldyn.system.loads import Unbalance
 from nldyn.system.system import System
 
 FLIGHT, CONTACT = 0.0, 1.0

@@ -26,7 +26,7 @@ from nldyn.branches.continuation import continue_branch
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.orbits.solve import solve_orbit
-from nldyn.system.elements import Stop
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 mp = mpmath.mp

@@ -31,7 +31,8 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
-from nldyn.system.elements import HarmonicForce, Stop
+from nldyn.system.loads import HarmonicForce
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 DEFAULT = FlowOptions()

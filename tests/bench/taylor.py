@@ -15,7 +15,7 @@ import numpy as np
 from bench import motion
 from bench.models import Case
 from nldyn.base.arrays import Real
-from nldyn.system.elements import Unbalance
+from nldyn.system.loads import Unbalance
 
 OMEGA, SIZE = hy.par[0], hy.par[1]
 

@@ -15,7 +15,8 @@ from hard.multiprecision import JACOBIAN, ORIGIN, PROMISE, STATE, newton_step, o
 from hard.stiffness import beam_with_stop
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
-from nldyn.system.elements import HarmonicForce, Stop
+from nldyn.system.loads import HarmonicForce
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 SUBJECT = "chatter and sustained contact"

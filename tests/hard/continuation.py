@@ -13,7 +13,7 @@ from hard.case import Case, Measured
 from nldyn.bifurcations.point import SpecialPoint
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
 from nldyn.paper.jobs import scene_system

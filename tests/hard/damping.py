@@ -28,7 +28,8 @@ from nldyn.longterm.impacts import Impacts, impacts
 from nldyn.longterm.simulation import simulate
 from nldyn.orbits.solve import solve_orbit
 from nldyn.paper.jobs import BILINEAR_ALPHA, STIFFNESS, scene_system
-from nldyn.system.elements import HarmonicForce, Stop
+from nldyn.system.loads import HarmonicForce
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 mp = mpmath.mp

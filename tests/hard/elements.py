@@ -22,7 +22,8 @@ from nldyn.branches.continuation import continue_branch
 from nldyn.orbits.solve import solve_orbit
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene
-from nldyn.system.elements import Stop, Unbalance
+from nldyn.system.loads import Unbalance
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 SUBJECT = "finite elements and units"

@@ -16,7 +16,8 @@ from nldyn.branches.continuation import continue_branch
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
-from nldyn.system.elements import HarmonicForce, Stop
+from nldyn.system.loads import HarmonicForce
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 SUBJECT = "grazing"

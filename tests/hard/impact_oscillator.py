@@ -17,7 +17,8 @@ import scipy.linalg as sla
 from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
-from nldyn.system.elements import HarmonicForce, Stop
+from nldyn.system.loads import HarmonicForce
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 mp = mpmath.mp

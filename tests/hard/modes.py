@@ -26,7 +26,9 @@ from nldyn.longterm.simulation import simulate
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import find_orbits
-from nldyn.system.elements import Damper, HarmonicForce, Stop
+from nldyn.system.loads import HarmonicForce
+from nldyn.system.springs_dampers import Damper
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 SUBJECT = "modes"

@@ -25,12 +25,13 @@ from nldyn.bifurcations.normal_forms import normal_form, switch_at_branch_point
 from nldyn.bifurcations.point import SpecialPoint
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch
-from nldyn.branches.options import ContinuationOptions
+from nldyn.branches.step_control import ContinuationOptions
 from nldyn.curves.curves import continue_special
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import find_orbits
-from nldyn.system.elements import HarmonicForce, Stop, Unbalance
+from nldyn.system.loads import HarmonicForce, Unbalance
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 SUBJECT = "resonances, folds and cusps"

@@ -12,7 +12,7 @@ from hard.case import Case, Measured
 from nldyn.flow.flow_map import FlowMap
 from nldyn.longterm.impacts import impacts
 from nldyn.longterm.simulation import simulate
-from nldyn.system.elements import ConstantForce, HarmonicForce
+from nldyn.system.loads import ConstantForce, HarmonicForce
 from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.system import System
 

@@ -15,7 +15,8 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.longterm.impacts import impacts
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
-from nldyn.system.elements import Stop, Unbalance
+from nldyn.system.loads import Unbalance
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 SUBJECT = "stiffness"

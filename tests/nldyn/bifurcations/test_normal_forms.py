@@ -26,7 +26,7 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.bifurcations.chord import CROSSING_ERROR
-from nldyn.bifurcations.critical import (
+from nldyn.bifurcations.normal_form_coefficients import (
     CoefficientError,
     Estimate,
     Loop,
@@ -320,7 +320,7 @@ def test_error_of_a_coefficient_covers_other_steps(harmonic_branch, monkeypatch,
             continue
         first = normal_form(special).coefficient
         with monkeypatch.context() as patch:
-            patch.setattr("nldyn.bifurcations.critical.LARGEST_STEP", longest)
+            patch.setattr("nldyn.bifurcations.normal_form_coefficients.LARGEST_STEP", longest)
             other = normal_form(special).coefficient
         assert abs(other.value - first.value) <= first.error + other.error
         assert first.error < 1e-5 * abs(first.value)

@@ -16,8 +16,9 @@ from nldyn.plot.diagram import branch_curve, length_unit, plot_diagram, plot_orb
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene
 from nldyn.system.chart import NAMES, UNITS
-from nldyn.system.elements import Stop, Unbalance
+from nldyn.system.loads import Unbalance
 from nldyn.system.parameters import Parameter
+from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 

@@ -16,7 +16,7 @@ from nldyn.app.cli import main
 from nldyn.base.resources import example
 from nldyn.scene.backbone import undamped
 from nldyn.scene.build import build_parts, build_reduced, build_system
-from nldyn.scene.case_keys import case_keys
+from nldyn.scene.case_fingerprints import case_fingerprints
 from nldyn.scene.read import load_scene, parse_scene
 from nldyn.system.rest import rest
 
@@ -183,9 +183,9 @@ def test_files_of_components_count_in_studies(tmp_path):
     import tomllib
 
     tables = [tomllib.loads((tmp_path / "chain.toml").read_text())]
-    before = case_keys(tables, tmp_path, len, "n")
+    before = case_fingerprints(tables, tmp_path, len, "n")
     io.mmwrite(tmp_path / "M.mtx", sparse.eye_array(30))
-    assert case_keys(tables, tmp_path, len, "n") != before
+    assert case_fingerprints(tables, tmp_path, len, "n") != before
 
 
 @pytest.mark.parametrize(

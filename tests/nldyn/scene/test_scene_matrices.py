@@ -13,7 +13,7 @@ from scipy import io, sparse
 from nldyn import SceneError, solve_orbit
 from nldyn.app.cli import main
 from nldyn.scene.build import build_system
-from nldyn.scene.case_keys import case_keys
+from nldyn.scene.case_fingerprints import case_fingerprints
 from nldyn.scene.read import load_scene, parse_scene
 
 COUNT = 60
@@ -167,7 +167,7 @@ def test_studies_tell_files_of_matrices_apart(tmp_path):
     tables = json.loads(json.dumps(tomllib.loads(path.read_text())))
 
     def key() -> str:
-        return case_keys([tables], tmp_path, max, "name")[0]
+        return case_fingerprints([tables], tmp_path, max, "name")[0]
 
     keys = [key(), key()]
     for name, matrix in (("K.npz", 2.0 * chain(COUNT)), ("load.npy", np.ones(COUNT))):

@@ -12,7 +12,7 @@ import pytest
 
 from nldyn import FlowMap, SceneError, Stop, SystemModelError, parameter_study
 from nldyn.base.resources import example
-from nldyn.scene.case_keys import case_keys
+from nldyn.scene.case_fingerprints import case_fingerprints
 
 GAPS = [0.0, 5e-4, 1e-3]
 
@@ -151,7 +151,7 @@ def test_a_file_that_is_no_study_is_refused(tmp_path):
 
 
 def key_of(measure, name=None):
-    return case_keys([{}], Path(), measure, name)[0]
+    return case_fingerprints([{}], Path(), measure, name)[0]
 
 
 def scaled(factor):
@@ -226,7 +226,7 @@ def test_another_mesh_of_the_same_name_has_other_keys(tmp_path):
     keys = set()
     for content in (b"one", b"two", b"one"):
         (tmp_path / "beam.msh").write_bytes(content)
-        keys.add(case_keys(tables, tmp_path, cluster_tasks.frequencies, None)[0])
+        keys.add(case_fingerprints(tables, tmp_path, cluster_tasks.frequencies, None)[0])
     assert len(keys) == 2
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, numbers, shown
-from nldyn.system.elements import _finite, _positive, check_ends
+from nldyn.system.values import check_ends, check_finite, check_positive
 
 LARGEST_DEGREE = 9
 DRAGS = ("speed", "displacement")
@@ -52,7 +52,7 @@ class Spring:
 
     def __post_init__(self) -> None:
         check_ends("spring", self.at, self.against)
-        _finite(f"spring at '{self.at}'", "stiffness", self.stiffness)
+        check_finite(f"spring at '{self.at}'", "stiffness", self.stiffness)
 
 
 @dataclass(frozen=True)
@@ -102,6 +102,39 @@ class PolynomialSpring:
 
 
 @dataclass(frozen=True)
+class Damper:
+    """Linear viscous damper from an interface to the ground, or to another interface.
+
+    Parameters
+    ----------
+    at : str
+        Interface.
+    coefficient : float
+        Damping in N s/m, zero or positive.
+    against : str, optional
+        Interface at the other end; the ground unless given.
+
+    Examples
+    --------
+    >>> Damper("middle", 5.81).coefficient
+    5.81
+    """
+
+    at: str
+    coefficient: float
+    against: str | None = None
+
+    def __post_init__(self) -> None:
+        check_ends("damper", self.at, self.against)
+        owner = f"damper at '{self.at}'"
+        check_finite(owner, "coefficient", self.coefficient)
+        if self.coefficient < 0.0:
+            raise SystemModelError(
+                f"{owner}: coefficient must not be negative, got {self.coefficient:g}"
+            )
+
+
+@dataclass(frozen=True)
 class CubicDamper:
     r"""Nonlinear damper that acts all the time: :math:`F = c\,u'^3`, or :math:`F = c\,u^2 u'`.
 
@@ -136,7 +169,7 @@ class CubicDamper:
     def __post_init__(self) -> None:
         check_ends("damper", self.at, self.against)
         owner = f"damper at '{self.at}'"
-        _positive(owner, "coefficient", self.coefficient)
+        check_positive(owner, "coefficient", self.coefficient)
         if self.by not in DRAGS:
             raise SystemModelError(
                 f"{owner}: by must be {' or '.join(map(repr, DRAGS))}, got {shown(self.by)}"

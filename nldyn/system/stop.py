@@ -1,54 +1,21 @@
-"""Stops, dampers and excitation: what acts on a reduced model at its interface points."""
+"""Stops that give way under a force, and the coefficients of their laws."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import (
-    SystemModelError,
-    check_frequency,
-    check_types,
-    is_finite,
-    shown,
-)
+from nldyn.base.errors import SystemModelError, check_types, shown
 from nldyn.system.contact_law import ContactLaw, check_law, power_law
+from nldyn.system.values import check_finite, check_positive, check_sides
 
 LARGEST_EXPONENT = 4.0
-LARGEST_PHASE = 1e6  # in degrees: rounded to 1e-10 degrees
-
-
-def _finite(owner: str, name: str, value: float) -> None:
-    if not is_finite(value):
-        raise SystemModelError(f"{owner}: {name} must be a finite number, got {shown(value)}")
-
-
-def _positive(owner: str, name: str, value: float) -> None:
-    _finite(owner, name, value)
-    if value <= 0.0:
-        raise SystemModelError(f"{owner}: {name} must be positive, got {value:g}")
-
-
-def check_ends(kind: str, at: object, against: object) -> None:
-    """Refuse what names no interface, and one interface at both ends of an element."""
-    check_types(**{f"{kind}: at": (at, str), f"{kind}: against": (against, str, None)})
-    if against == at:
-        raise SystemModelError(f"{kind} at '{at}': against must be another interface")
-
-
-def check_sides(owner: str, at: str, against: str | None, direction: int) -> None:
-    """Refuse a stop between an interface and itself, and a direction that is no sign."""
-    if against == at:
-        raise SystemModelError(f"{owner}: against must be another interface")
-    if isinstance(direction, bool | np.bool_) or direction not in (1, -1):
-        raise SystemModelError(f"{owner}: direction must be +1 or -1, got {direction}")
 
 
 def hertz_stiffness(
@@ -90,7 +57,7 @@ def hertz_stiffness(
     '1.0879e+10'
     """
     owner = "hertz_stiffness"
-    _positive(owner, "radius", radius)
+    check_positive(owner, "radius", radius)
     compliance = 0.0
     for modulus, ratio in (
         (youngs_modulus, poissons_ratio),
@@ -99,8 +66,8 @@ def hertz_stiffness(
             poissons_ratio if other_poissons_ratio is None else other_poissons_ratio,
         ),
     ):
-        _positive(owner, "youngs_modulus", modulus)
-        _finite(owner, "poissons_ratio", ratio)
+        check_positive(owner, "youngs_modulus", modulus)
+        check_finite(owner, "poissons_ratio", ratio)
         if not -1.0 < ratio <= 0.5:
             raise SystemModelError(f"{owner}: poissons_ratio must lie in (-1, 0.5], got {ratio:g}")
         compliance += (1.0 - ratio**2) / modulus
@@ -144,8 +111,8 @@ def dissipation_for(restitution: float, speed: float, *, law: str = "exact") -> 
     (3.33, 28.66)
     """
     owner = "dissipation_for"
-    _positive(owner, "restitution", restitution)
-    _positive(owner, "speed", speed)
+    check_positive(owner, "restitution", restitution)
+    check_positive(owner, "speed", speed)
     if restitution > 1.0:
         raise SystemModelError(f"{owner}: restitution must be at most 1, got {restitution:g}")
     if law == "exact":
@@ -221,7 +188,7 @@ def dashpot_for(restitution: float, stiffness: float, mass: float, *, pulls: boo
     """
     owner = "dashpot_for"
     for name, value in (("restitution", restitution), ("stiffness", stiffness), ("mass", mass)):
-        _positive(owner, name, value)
+        check_positive(owner, name, value)
     if restitution > 1.0:
         raise SystemModelError(f"{owner}: restitution must be at most 1, got {restitution:g}")
     lost = -math.log(restitution)
@@ -306,19 +273,19 @@ class Stop:
     def __post_init__(self) -> None:
         check_types(**{"stop: at": (self.at, str), "stop: against": (self.against, str, None)})
         owner = f"stop at '{self.at}'"
-        _positive(owner, "stiffness", self.stiffness)
-        _finite(owner, "exponent", self.exponent)
+        check_positive(owner, "stiffness", self.stiffness)
+        check_finite(owner, "exponent", self.exponent)
         if not 1.0 <= self.exponent <= LARGEST_EXPONENT:
             raise SystemModelError(
                 f"{owner}: exponent must lie in [1, {LARGEST_EXPONENT:g}], "
                 f"got {shown(self.exponent)}"
             )
-        _finite(owner, "dissipation", self.dissipation)
+        check_finite(owner, "dissipation", self.dissipation)
         if self.dissipation < 0.0:
             raise SystemModelError(
                 f"{owner}: dissipation must not be negative, got {self.dissipation:g}"
             )
-        _finite(owner, "dashpot", self.dashpot)
+        check_finite(owner, "dashpot", self.dashpot)
         if self.dashpot < 0.0:
             raise SystemModelError(f"{owner}: dashpot must not be negative, got {self.dashpot:g}")
         if self.law is not None:
@@ -334,7 +301,7 @@ class Stop:
                 f"{owner}: pulls = False is for a linear stop (exponent 1) with a dashpot; others "
                 "without one never pull, but for a loss by dissipation"
             )
-        _finite(owner, "gap", self.gap)
+        check_finite(owner, "gap", self.gap)
         check_sides(owner, self.at, self.against, self.direction)
 
     @property
@@ -433,245 +400,3 @@ class Stop:
         1.0
         """
         return cls(at, stiffness, 1.0, gap, direction, against, dissipation, None, dashpot, pulls)
-
-
-@dataclass(frozen=True)
-class Damper:
-    """Linear viscous damper from an interface to the ground, or to another interface.
-
-    Parameters
-    ----------
-    at : str
-        Interface.
-    coefficient : float
-        Damping in N s/m, zero or positive.
-    against : str, optional
-        Interface at the other end; the ground unless given.
-
-    Examples
-    --------
-    >>> Damper("middle", 5.81).coefficient
-    5.81
-    """
-
-    at: str
-    coefficient: float
-    against: str | None = None
-
-    def __post_init__(self) -> None:
-        check_ends("damper", self.at, self.against)
-        owner = f"damper at '{self.at}'"
-        _finite(owner, "coefficient", self.coefficient)
-        if self.coefficient < 0.0:
-            raise SystemModelError(
-                f"{owner}: coefficient must not be negative, got {self.coefficient:g}"
-            )
-
-
-@dataclass(frozen=True)
-class HarmonicForce:
-    """Force ``amplitude * cos(m ωt + phase)`` at an interface, or one of a frequency of its own.
-
-    Parameters
-    ----------
-    at : str
-        Interface, or load vector.
-    amplitude : float
-        Amplitude in N.
-    phase_deg : float
-        Phase in degrees.
-    harmonic : int
-        Multiple m of the excitation frequency, from 1 to 1000. Where half orders act, as in a
-        four-stroke engine, the excitation frequency is that of the whole cycle.
-    frequency_hz : float, optional
-        A frequency of its own in Hz, which does not change with that of the excitation: two without
-        a common period have no periodic response, so that such a force can only be simulated. The
-        time counts from the start of the simulation.
-
-    Examples
-    --------
-    >>> HarmonicForce("middle", 2.0).phasor
-    (2+0j)
-    """
-
-    at: str
-    amplitude: float
-    phase_deg: float = 0.0
-    harmonic: int = 1
-    frequency_hz: float | None = None
-
-    power: ClassVar[int] = 0  # the force is Re(phasor (mω)**power e^{i m ωt})
-
-    def __post_init__(self) -> None:
-        _check_excitation(self.at, "amplitude", self.amplitude, self.phase_deg, self.harmonic)
-        if self.frequency_hz is None:
-            return
-        owner = f"excitation at '{self.at}'"
-        check_frequency(f"{owner}: frequency_hz", self.frequency_hz)
-        if self.harmonic != 1:
-            raise SystemModelError(f"{owner}: give either harmonic or frequency_hz")
-
-    @property
-    def phasor(self) -> complex:
-        """Complex amplitude in N."""
-        return self.amplitude * turn(self.phase_deg)
-
-
-@dataclass(frozen=True)
-class Unbalance:
-    """Rotating unbalance: force ``mass_times_radius * (mω)² * cos(m ωt + phase)``.
-
-    Parameters
-    ----------
-    at : str
-        Interface, or load vector.
-    mass_times_radius : float
-        Unbalanced mass times its radius in kg m.
-    phase_deg : float
-        Phase in degrees.
-    harmonic : int
-        Multiple m of the excitation frequency, from 1 to 1000.
-
-    Examples
-    --------
-    >>> Unbalance("middle", 2.0).phasor
-    (2+0j)
-    """
-
-    at: str
-    mass_times_radius: float
-    phase_deg: float = 0.0
-    harmonic: int = 1
-
-    power: ClassVar[int] = 2
-
-    def __post_init__(self) -> None:
-        _check_excitation(
-            self.at, "mass_times_radius", self.mass_times_radius, self.phase_deg, self.harmonic
-        )
-
-    @property
-    def phasor(self) -> complex:
-        """Complex amplitude over (mω)² in kg m."""
-        return self.mass_times_radius * turn(self.phase_deg)
-
-
-@dataclass(frozen=True)
-class ConstantForce:
-    """Force that does not change: a mean load, or a weight where it acts on a load vector.
-
-    Parameters
-    ----------
-    at : str
-        Interface, or load vector (then a factor of it: in m/s² for one of a weight).
-    force : float
-        In N, of either sign.
-
-    Examples
-    --------
-    >>> ConstantForce("gear", -0.1).phasor
-    (-0.1+0j)
-    """
-
-    at: str
-    force: float
-
-    power: ClassVar[int] = 0
-    harmonic: ClassVar[int] = 0
-
-    def __post_init__(self) -> None:
-        check_types(**{"excitation: at": (self.at, str)})
-        _finite(f"excitation at '{self.at}'", "force", self.force)
-
-    @property
-    def phasor(self) -> complex:
-        """The force in N, as a complex number."""
-        return complex(self.force)
-
-
-@dataclass(frozen=True)
-class BaseMotion:
-    r"""Motion of the supports, by which a structure that is described relative to them is shaken.
-
-    Relative to the base the structure feels the force :math:`-M r \ddot x_b(t)`. The load vector
-    ``at`` is :math:`M r`, with r the displacement of the whole structure when the base moves by
-    one. Displacements are relative to the base.
-
-    Parameters
-    ----------
-    at : str
-        Load vector in kg.
-    amplitude : float
-        Amplitude of the base's displacement, velocity or acceleration in m, m/s or m/s².
-    quantity : {"displacement", "velocity", "acceleration"}
-        What keeps this amplitude at every frequency.
-    phase_deg : float
-        Phase in degrees.
-    harmonic : int
-        Multiple of the excitation frequency, from 1 to 1000.
-
-    Examples
-    --------
-    >>> BaseMotion("base", 1e-3).power
-    2
-    """
-
-    at: str
-    amplitude: float
-    quantity: str = "displacement"
-    phase_deg: float = 0.0
-    harmonic: int = 1
-
-    def __post_init__(self) -> None:
-        _check_excitation(self.at, "amplitude", self.amplitude, self.phase_deg, self.harmonic)
-        if self.quantity not in _BASE_QUANTITIES:
-            raise SystemModelError(
-                f"excitation at '{self.at}': quantity must be "
-                f"{', '.join(map(repr, _BASE_QUANTITIES))}, got {shown(self.quantity)}"
-            )
-
-    @property
-    def power(self) -> int:
-        """Power of the frequency with which the force goes."""
-        return _BASE_QUANTITIES[self.quantity][0]
-
-    @property
-    def phasor(self) -> complex:
-        """Complex amplitude of minus the acceleration over (mω)**power."""
-        return self.amplitude * _BASE_QUANTITIES[self.quantity][1] * turn(self.phase_deg)
-
-
-# power of ω in minus the acceleration, and its factor
-_BASE_QUANTITIES = {"displacement": (2, 1.0), "velocity": (1, -1j), "acceleration": (0, -1.0)}
-
-Excitation = HarmonicForce | Unbalance | ConstantForce | BaseMotion
-MOST_HARMONIC = 1000
-
-
-def _check_excitation(at: str, name: str, value: float, phase_deg: float, harmonic: int) -> None:
-    check_types(**{"excitation: at": (at, str)})
-    owner = f"excitation at '{at}'"
-    _finite(owner, name, value)
-    if value < 0.0:
-        raise SystemModelError(f"{owner}: {name} must not be negative, got {value:g}")
-    _finite(owner, "phase_deg", phase_deg)
-    if abs(phase_deg) > LARGEST_PHASE:
-        raise SystemModelError(
-            f"{owner}: phase_deg must lie between -{LARGEST_PHASE:g} and {LARGEST_PHASE:g}, "
-            f"got {phase_deg!r}"
-        )
-    whole = isinstance(harmonic, int | np.integer) and not isinstance(harmonic, bool)
-    if not whole or not 1 <= harmonic <= MOST_HARMONIC:
-        raise SystemModelError(
-            f"{owner}: harmonic must be a whole number from 1 to {MOST_HARMONIC}, got "
-            f"{shown(harmonic)}; where half orders act, let the excitation frequency be that of "
-            "the whole cycle; two frequencies without a common period have no periodic response: "
-            "simulate them, one as frequency_hz of a HarmonicForce, or take a lower one of which "
-            "both are multiples, nearly (5 and 7 for a ratio of 1.4)"
-        )
-
-
-def turn(phase_deg: float) -> complex:
-    """Complex number of length 1 at a phase."""
-    phase = math.radians(phase_deg)
-    return complex(math.cos(phase), math.sin(phase))

@@ -21,7 +21,7 @@ from nldyn.base.errors import SystemModelError, shown
 PLAIN = (bool, int, float, complex, str, bytes, np.generic, PurePath, range, slice)
 
 
-def case_keys(
+def case_fingerprints(
     cases: list[dict[str, Any]], folder: Path, measure: Callable[..., Any], name: str | None
 ) -> list[str]:
     """A key for each case, of its tables, the bytes of the files it names and the measure.
@@ -31,7 +31,9 @@ def case_keys(
     SystemModelError
         If the measure depends on an object that has no key and no name is given.
     """
-    identity = ["named", name] if name is not None else ["measure", MeasureKey(measure).of_measure]
+    identity = (
+        ["named", name] if name is not None else ["measure", MeasureFingerprint(measure).of_measure]
+    )
     read: dict[str, str] = {}
     keys = []
     for tables in cases:
@@ -70,7 +72,7 @@ def _bytes_hash(path: Path) -> str:
     return "unreadable"  # the case itself will tell why
 
 
-class MeasureKey:
+class MeasureFingerprint:
     """What a measure computes, as plain nested lists.
 
     Its code counts, with its constants, defaults, closure and the global names that it uses, and
@@ -86,7 +88,7 @@ class MeasureKey:
     --------
     >>> def times(factor):
     ...     return lambda system: {"f": factor * system.size}
-    >>> keys = [MeasureKey(times(factor)).of_measure for factor in (2, 2, 3)]
+    >>> keys = [MeasureFingerprint(times(factor)).of_measure for factor in (2, 2, 3)]
     >>> keys[0] == keys[1], keys[1] == keys[2]
     (True, False)
     """

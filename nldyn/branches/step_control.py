@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from nldyn.base.errors import SystemModelError, check_whole, is_finite, shown
 
 MOST_POINTS = 10**8  # in one direction
+AIMED_ANGLE = 0.7  # of the largest angle: what the next step should turn by, as this one did
+AIMED_MISS = 0.5  # of the largest miss, which grows with the square of a step
+LEAST_ANGLE, LEAST_MISS = 1e-3, 1e-6  # below which both say no more of the next step
+LARGEST_SHRINKAGE, LARGEST_GROWTH = 0.5, 1.6  # of a step after the one before
 
 
 @dataclass(frozen=True)
@@ -61,3 +66,10 @@ class ContinuationOptions:
                 f"continuation: max_angle must lie below 1.5, got {self.max_angle:g}"
             )
         check_whole("continuation: max_points", self.max_points, 2, MOST_POINTS)
+
+    def next_step(self, step: float, angle: float, miss: float) -> float:
+        """Length of the step after one, by its angle and its miss; one that fails is halved."""
+        growth = AIMED_ANGLE * self.max_angle / max(angle, LEAST_ANGLE)
+        growth = min(growth, math.sqrt(AIMED_MISS * self.max_miss / max(miss, LEAST_MISS)))
+        growth = min(max(growth, LARGEST_SHRINKAGE), LARGEST_GROWTH)
+        return min(step * growth, self.max_step)

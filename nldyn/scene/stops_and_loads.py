@@ -11,21 +11,11 @@ from nldyn.base.errors import SystemModelError
 from nldyn.scene.faults import check_regular, told_as, unreadable
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import DamperTable, ExcitationTable, Scene, SpringTable, StopTable
-from nldyn.system.elements import (
-    BaseMotion,
-    ConstantForce,
-    Damper,
-    Excitation,
-    HarmonicForce,
-    Stop,
-    Unbalance,
-    dashpot_for,
-    dissipation_for,
-    hertz_stiffness,
-)
+from nldyn.system.loads import BaseMotion, ConstantForce, Excitation, HarmonicForce, Unbalance
 from nldyn.system.measured import MeasuredForce, measured_force
 from nldyn.system.rigid_stop import AnyStop, RigidStop
-from nldyn.system.springs import CubicDamper, PolynomialSpring, Spring
+from nldyn.system.springs_dampers import CubicDamper, Damper, PolynomialSpring, Spring
+from nldyn.system.stop import Stop, dashpot_for, dissipation_for, hertz_stiffness
 from nldyn.system.system import AnyDamper, AnySpring
 
 logger = logging.getLogger("nldyn")
