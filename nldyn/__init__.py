@@ -4,27 +4,8 @@ The names are loaded when they are first asked for: `import nldyn` itself takes 
 the command line answers at once. The list of them, with their homes, is ``nldyn/__init__.pyi``.
 """
 
-import ast
-from importlib import import_module
 from pathlib import Path
 
+from nldyn.base.face import face
 
-def _homes() -> dict[str, str]:
-    """Modules of the public names, out of the stub beside this file."""
-    stub = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
-    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
-    return {name.name: str(node.module) for node in imports for name in node.names}
-
-
-_HOMES = _homes()
-__all__ = sorted(_HOMES)
-
-
-def __getattr__(name: str) -> object:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'nldyn' has no attribute '{name}'")
-    return getattr(import_module(_HOMES[name]), name)
-
-
-def __dir__() -> list[str]:
-    return __all__
+__getattr__, __dir__, __all__ = face(__name__, Path(__file__).parent)

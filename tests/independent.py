@@ -10,7 +10,8 @@ import scipy.linalg as sla
 from numba import njit
 from scipy.integrate import DOP853, solve_ivp
 
-from nldyn import CubicDamper, PolynomialSpring, Spring, Stop, System
+from nldyn import PolynomialSpring, Spring, Stop, System
+from nldyn.system import CubicDamper
 
 TABLEAU = DOP853.A, DOP853.B, DOP853.C, DOP853.E3, DOP853.E5  # of order 8, with two estimates
 RTOL = 2e-13

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -142,6 +144,16 @@ def test_no_modules_import_each_other_in_a_circle():
         for name in ground:
             del arrows[name]
     assert sorted(arrows) == []
+
+
+def test_each_public_name_is_listed_once_and_loads():
+    rooms = [room for room in FLOOR["nldyn"] if (ROOT / "nldyn" / room / "__init__.pyi").exists()]
+    faces = ["nldyn", *(f"nldyn.{room}" for room in rooms)]
+    listed = [name for package in faces for name in import_module(package).__all__]
+    assert sorted(set(listed)) == sorted(listed)
+    for package in faces:
+        things = [getattr(import_module(package), name) for name in import_module(package).__all__]
+        assert not any(isinstance(thing, ModuleType) for thing in things), package
 
 
 @pytest.mark.parametrize("package", FLOORS)

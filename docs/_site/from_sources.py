@@ -23,6 +23,7 @@ from sphinx.util import logging
 from sphinx.writers.html5 import HTML5Translator
 
 import nldyn
+from nldyn.base.face import homes
 
 log = logging.getLogger(__name__)
 DOCS = Path(__file__).resolve().parents[1]
@@ -41,9 +42,10 @@ def navigation(text: str) -> str:
 
 def public_names(room: str) -> list[str]:
     """Full names of what a package shows, or a room of nldyn."""
-    listed = [f"nldyn.{name}" for name, home in nldyn._HOMES.items() if home.startswith(f"{room}.")]
+    known = homes("nldyn", DOCS.parent / "nldyn")
+    in_the_face = [name for name in nldyn.__all__ if known[name].startswith(f"{room}.")]
     shown = getattr(import_module(room), "__all__", ())
-    return listed or [f"{room}.{name}" for name in shown]
+    return [f"nldyn.{name}" for name in in_the_face] + [f"{room}.{name}" for name in shown]
 
 
 def undocumented(name: str, thing: Any) -> Iterator[str]:

@@ -10,9 +10,8 @@ import matplotlib.pyplot as plt
 from nldyn import continue_branch, solve_orbit
 from nldyn.base.resources import example
 from nldyn.plot import plot_diagram
-from nldyn.scene.build import build_system
-from nldyn.scene.read import load_scene
-from nldyn.system.rest import closed_at_rest, rest
+from nldyn.scene import build_system, load_scene
+from nldyn.system import closed_at_rest, rest
 
 gears = build_system(load_scene(example("gear_pair.toml")))
 branch = continue_branch(solve_orbit(gears, 0.2387), (0.0477, 0.2387))

@@ -11,8 +11,7 @@ from scipy.optimize import brentq
 
 from nldyn import continue_branch, solve_orbit
 from nldyn.base.resources import example
-from nldyn.scene.build import build_system
-from nldyn.scene.read import load_scene
+from nldyn.scene import build_system, load_scene
 
 rotor = build_system(load_scene(example("rotor_against_stator.toml")))
 branch = continue_branch(solve_orbit(rotor, 30.4), (30.0, 31.1))

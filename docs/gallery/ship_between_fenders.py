@@ -10,9 +10,8 @@ import matplotlib.pyplot as plt
 from nldyn import solve_orbit
 from nldyn.base.resources import example
 from nldyn.plot import plot_history
-from nldyn.scene.build import build_system
-from nldyn.scene.read import load_scene
-from nldyn.system.rest import rest
+from nldyn.scene import build_system, load_scene
+from nldyn.system import rest
 
 ship = build_system(load_scene(example("ship_between_fenders.toml")))
 orbit = solve_orbit(ship, 0.5)

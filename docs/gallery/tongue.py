@@ -11,7 +11,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from nldyn import HarmonicForce, Stop, System, continue_special, refine_special, solve_orbit
+from nldyn import HarmonicForce, Stop, System, continue_special, solve_orbit
+from nldyn.curves import refine_special
 from nldyn.plot import plot_curves
 
 damping = 0.05

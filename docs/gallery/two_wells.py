@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from nldyn import HarmonicForce, PolynomialSpring, StatePlane, System, basins
-from nldyn.longterm.attractors import AttractorOptions
+from nldyn.longterm import AttractorOptions
 from nldyn.plot import plot_basins
 
 hz, force, damping = 0.15, 0.08, 0.2

@@ -861,7 +861,7 @@ def describe_system(system: System, residual: int = 0) -> str:
 
 def describe_rest(system: System) -> list[str]:
     """Say where the structure rests, and what holds it, if that is not at zero."""
-    from nldyn.system.rest import closed_at_rest, rest_positions
+    from nldyn.system.equilibrium import closed_at_rest, rest_positions
 
     found = rest_positions(system)
     q, others = found[0], found[1:]

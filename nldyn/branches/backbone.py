@@ -29,7 +29,7 @@ from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.orbits.newton import spread
 from nldyn.orbits.orbit import Orbit, check_observe
 from nldyn.orbits.shooting import ShootingProblem, shooting_problem
-from nldyn.system.rest import (
+from nldyn.system.equilibrium import (
     at_rest,
     constant_force,
     force_at,

@@ -47,7 +47,7 @@ class Tally:
 
 
 class BranchFile(Protocol):
-    """A file of branches; `nldyn.CheckpointFile` is one.
+    """A file of branches; `nldyn.io.CheckpointFile` is one.
 
     For developers: whatever else keeps branches has these methods.
     """

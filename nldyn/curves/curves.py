@@ -49,7 +49,7 @@ CROSSES_END = 1e-3  # component of a unit tangent that leads to or from the end 
 
 
 class CurveFile(Protocol):
-    """A file that keeps a curve; `nldyn.CheckpointFile` is one."""
+    """A file that keeps a curve; `nldyn.io.CheckpointFile` is one."""
 
     @property
     def name(self) -> str:

@@ -60,7 +60,8 @@ def write_history(history: History, path: str | Path) -> None:
 
     Examples
     --------
-    >>> from nldyn import System, Unbalance, solve_orbit, write_history
+    >>> from nldyn import System, Unbalance, solve_orbit
+    >>> from nldyn.io import write_history
     >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
     ...     excitation=[Unbalance("middle", 4.92e-6)])
     >>> history = solve_orbit(system, frequency_hz=10.0).history()

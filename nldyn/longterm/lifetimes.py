@@ -170,7 +170,8 @@ def chaos_lifetime(
 
     Examples
     --------
-    >>> from nldyn import Stop, System, Unbalance, chaos_lifetime, classify_attractor
+    >>> from nldyn import Stop, System, Unbalance, classify_attractor
+    >>> from nldyn.longterm import chaos_lifetime
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])

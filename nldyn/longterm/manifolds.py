@@ -71,7 +71,8 @@ def stable_manifold(
 
     Examples
     --------
-    >>> from nldyn import StatePlane, Stop, System, Unbalance, solve_orbit, stable_manifold
+    >>> from nldyn import StatePlane, Stop, System, Unbalance, solve_orbit
+    >>> from nldyn.longterm import stable_manifold
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])

@@ -208,7 +208,8 @@ def brute_force(
 
     Examples
     --------
-    >>> from nldyn import Stop, System, Unbalance, brute_force
+    >>> from nldyn import Stop, System, Unbalance
+    >>> from nldyn.longterm import brute_force
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])

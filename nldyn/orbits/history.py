@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class History:
     """A motion sampled in time, from `Orbit.history` or `Motion.history`.
 
-    `nldyn.write_history` writes it to a CSV, MAT or UFF file.
+    `nldyn.io.write_history` writes it to a CSV, MAT or UFF file.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ from nldyn.orbits.shooting import ShootingProblem, shooting_problem
 from nldyn.orbits.starts import near_returns
 from nldyn.orbits.time_limit import OutOfTimeError, TimeLimit
 from nldyn.runtime.progress import Progress
-from nldyn.system.rest import at_rest, held_motion, rest
+from nldyn.system.equilibrium import at_rest, held_motion, rest
 from nldyn.system.system import System
 
 MORE_DAMPING = 7.0, 20.0, 55.0  # factors that may leave one orbit only

@@ -20,7 +20,7 @@ from nldyn.orbits.shooting import (
     metric_length,
     shooting_problem,
 )
-from nldyn.system.rest import at_rest, rest
+from nldyn.system.equilibrium import at_rest, rest
 from nldyn.system.system import System
 
 DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part

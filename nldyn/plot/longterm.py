@@ -18,8 +18,8 @@ from nldyn.base.errors import SystemModelError, check_choice, check_types, is_fi
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.longterm.attractors import Attractor
 from nldyn.longterm.basins import UNDECIDED, Basins
-from nldyn.longterm.contact_measures import UNITS as MEASURE_UNITS
-from nldyn.longterm.contact_measures import SpectraMap
+from nldyn.longterm.measures import UNITS as MEASURE_UNITS
+from nldyn.longterm.measures import SpectraMap
 from nldyn.longterm.poincare import BruteForce, Column, impact_section, stroboscopic_section
 from nldyn.longterm.simulation import Motion
 from nldyn.orbits.orbit import check_observe, stroboscopic
@@ -123,7 +123,7 @@ def plot_brute_force(
     Parameters
     ----------
     found : BruteForce
-        What `nldyn.brute_force` gave.
+        What `nldyn.longterm.brute_force` gave.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure, free of pyplot, unless given.
     quantity : {"peak", "strobe", "impact speed", "impact phase"}
@@ -348,8 +348,9 @@ def plot_wear(
 
     Examples
     --------
-    >>> from nldyn import Stop, System, Unbalance, brute_force
-    >>> from nldyn.longterm.contact_measures import measures_table
+    >>> from nldyn import Stop, System, Unbalance
+    >>> from nldyn.longterm import brute_force
+    >>> from nldyn.longterm.measures import measures_table
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
@@ -436,7 +437,7 @@ def plot_spectra(
     Parameters
     ----------
     found : SpectraMap
-        What `nldyn.spectra_map` gave, of at least one motion.
+        What `nldyn.longterm.spectra_map` gave, of at least one motion.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure, free of pyplot, unless given.
     scale : {"frequency", "order"}
@@ -455,7 +456,8 @@ def plot_spectra(
 
     Examples
     --------
-    >>> from nldyn import Stop, System, Unbalance, brute_force, spectra_map
+    >>> from nldyn import Stop, System, Unbalance
+    >>> from nldyn.longterm import brute_force, spectra_map
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])

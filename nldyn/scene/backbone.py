@@ -8,7 +8,7 @@ from nldyn.base.errors import SystemModelError
 from nldyn.branches.backbone import Backbone, backbone
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.curves.curves import Curve
-from nldyn.curves.phase_resonance import phase_resonance, strength_of
+from nldyn.curves.resonances import phase_resonance, strength_of
 from nldyn.orbits.conditions import driving_source
 from nldyn.scene.build import build_reduced, build_system
 from nldyn.scene.faults import told_as

@@ -19,7 +19,7 @@ from nldyn.scene.schema import ContinuationTable, Scene
 from nldyn.search.diagram import Diagram, SubharmonicSeed, diagram
 from nldyn.search.exploration import Exploration, ExploreOptions
 from nldyn.search.explore import explore
-from nldyn.system.rest import rest_positions
+from nldyn.system.equilibrium import rest_positions
 
 CHOICE = 1.0  # time to choose modes by a tolerance, relative to that of the diagram
 

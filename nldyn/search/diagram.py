@@ -59,7 +59,7 @@ from nldyn.orbits.starts import (
 from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.outlook import Outlook
-from nldyn.system.rest import at_rest, rest
+from nldyn.system.equilibrium import at_rest, rest
 from nldyn.system.system import System
 
 if TYPE_CHECKING:
@@ -576,7 +576,8 @@ def diagram(
 
     Examples
     --------
-    >>> from nldyn import OrbitSearchOptions, Stop, System, Unbalance, diagram
+    >>> from nldyn import Stop, System, Unbalance, diagram
+    >>> from nldyn.orbits import OrbitSearchOptions
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])

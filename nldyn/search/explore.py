@@ -57,7 +57,7 @@ AGAIN = 12  # times that a frequency is searched again while its indices say tha
 
 
 class ExplorationFile(Protocol):
-    """A file that keeps an exploration; `nldyn.CheckpointFile` is one."""
+    """A file that keeps an exploration; `nldyn.io.CheckpointFile` is one."""
 
     @property
     def name(self) -> str:

@@ -157,7 +157,8 @@ def extend_diagram(
 
     Examples
     --------
-    >>> from nldyn import Diagram, Mixtures, Stop, System, Unbalance
+    >>> from nldyn import Diagram, Stop, System, Unbalance
+    >>> from nldyn.search import Mixtures
     >>> from nldyn import continue_branch, find_orbits, solve_orbit
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],

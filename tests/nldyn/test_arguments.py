@@ -33,7 +33,6 @@ from nldyn import (
     harmonics,
     index_sum,
     normal_form,
-    refine_special,
     save,
     solve_orbit,
 )
@@ -41,6 +40,7 @@ from nldyn.bifurcations.normal_forms import switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.cascades import cascades_in
+from nldyn.curves import refine_special
 from nldyn.io.curves import load_curves
 from nldyn.plot.curves import plot_curves
 from nldyn.plot.diagram import plot_diagram

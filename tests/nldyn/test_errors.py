@@ -15,9 +15,7 @@ from nldyn import (
     Damper,
     FlowOptions,
     HarmonicForce,
-    OrbitSearchOptions,
     Stop,
-    SubharmonicSeed,
     System,
     SystemModelError,
     Unbalance,
@@ -27,6 +25,8 @@ from nldyn import (
     hertz_stiffness,
     solve_orbit,
 )
+from nldyn.orbits import OrbitSearchOptions
+from nldyn.search import SubharmonicSeed
 
 NOT_FINITE = st.sampled_from([math.nan, math.inf, -math.inf])
 NEGATIVE = st.floats(-1e100, -1e-100)

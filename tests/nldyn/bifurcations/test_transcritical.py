@@ -27,10 +27,10 @@ from nldyn import (
     continue_branch,
     continue_special,
     describe_special,
-    refine_special,
     solve_orbit,
 )
 from nldyn.bifurcations.normal_forms import other_tangent, switch_at_branch_point
+from nldyn.curves import refine_special
 from nldyn.orbits.orbit import Orbit
 
 FORCE, DAMPING_X, DAMPING_Y = 9.0, 0.1, 0.02

@@ -15,7 +15,6 @@ from nldyn import (
     ConvergenceError,
     FlowMap,
     HarmonicForce,
-    OrbitSearchOptions,
     Stop,
     System,
     SystemModelError,
@@ -34,6 +33,7 @@ from nldyn.branches.arclength import Stepper
 from nldyn.branches.continuation import start_point
 from nldyn.branches.leg import trace
 from nldyn.branches.peaks import lowest_orbit, resonance_peaks
+from nldyn.orbits import OrbitSearchOptions
 from nldyn.orbits.critical_functions import branch_point_test, flip_test, torus_test
 from nldyn.orbits.orbit import Orbit, minimal_period, same_orbit
 from nldyn.scene.build import build_system

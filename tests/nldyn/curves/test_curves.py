@@ -28,7 +28,6 @@ from nldyn import (
     continue_orbit,
     continue_special,
     normal_form,
-    refine_special,
     solve_orbit,
 )
 from nldyn.base.resources import example
@@ -36,6 +35,7 @@ from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.branches.endings import Ending
 from nldyn.branches.leg import trace
 from nldyn.curves import codimension_two as codimension
+from nldyn.curves import refine_special
 from nldyn.curves.codimension_two import along_tori, flip_coefficient, is_torus
 from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.conditions import Singular, bialternate, max_abs_displacement, peak_force

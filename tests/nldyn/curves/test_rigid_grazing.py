@@ -18,11 +18,11 @@ from nldyn import (
     continue_special,
     load,
     normal_form,
-    refine_special,
     save,
     solve_orbit,
 )
 from nldyn.branches.endings import Ending
+from nldyn.curves import refine_special
 
 DAMPING, RESTITUTION, GAP = 0.1, 0.8, 0.3
 TURN = 2.0 * math.pi

@@ -9,18 +9,10 @@ from scipy.optimize import minimize_scalar, root
 from scipy.special import ellipj, ellipk
 
 import nldyn
-from nldyn import (
-    CubicDamper,
-    FlowMap,
-    HarmonicForce,
-    Parameter,
-    PolynomialSpring,
-    Spring,
-    Stop,
-    System,
-)
+from nldyn import FlowMap, HarmonicForce, Parameter, PolynomialSpring, Spring, Stop, System
 from nldyn.base.errors import SystemModelError
 from nldyn.orbits.orbit import contact_damping
+from nldyn.system import CubicDamper
 
 WELLS = PolynomialSpring("a", [-1.0, 0.0, 1.0])
 

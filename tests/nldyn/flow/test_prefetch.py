@@ -10,10 +10,8 @@ from cluster_tasks import die_elsewhere, doubled, lossy_spring
 from problems import make_one_dof
 
 from nldyn import (
-    CheckpointFile,
     ExploreOptions,
     FlowMap,
-    OrbitSearchOptions,
     Stop,
     System,
     SystemModelError,
@@ -22,6 +20,8 @@ from nldyn import (
     explore,
 )
 from nldyn.flow.prefetch import Ahead, computing_ahead
+from nldyn.io import CheckpointFile
+from nldyn.orbits import OrbitSearchOptions
 
 WANTED = {
     "range_hz": (30.0, 60.0),

@@ -4,16 +4,8 @@ import numpy as np
 import pytest
 from problems import make_one_dof
 
-from nldyn import (
-    FlowMap,
-    FlowOptions,
-    HarmonicForce,
-    OrbitSearchOptions,
-    Stop,
-    System,
-    diagram,
-    solve_orbit,
-)
+from nldyn import FlowMap, FlowOptions, HarmonicForce, Stop, System, diagram, solve_orbit
+from nldyn.orbits import OrbitSearchOptions
 
 PERIOD = np.array([0.0, 2.0 * np.pi])
 

@@ -8,7 +8,6 @@ import pytest
 from problems import between_stops, make_one_dof
 
 from nldyn import (
-    CheckpointFile,
     ContinuationOptions,
     Damper,
     HarmonicForce,
@@ -24,6 +23,7 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.curves import curves
+from nldyn.io import CheckpointFile
 from nldyn.io.branches import load_branches
 from nldyn.io.curves import load_curves, save_curves
 from nldyn.orbits.conditions import peak_force

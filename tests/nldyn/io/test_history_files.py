@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from nldyn import Stop, System, SystemModelError, Unbalance, simulate, solve_orbit, write_history
+from nldyn import Stop, System, SystemModelError, Unbalance, simulate, solve_orbit
+from nldyn.io import write_history
 
 MASS, STIFFNESS, RATIO, UNBALANCE, HZ, GAP = 2.48, 16877.0, 0.0142, 4.92e-6, 10.0, 3e-5
 

@@ -13,9 +13,10 @@ import fem
 import nldyn
 from cms import ReducedModel
 from fem.model.store import load_model, load_structure
-from nldyn import CheckpointFile, diagram, parameter_study
+from nldyn import diagram, parameter_study
 from nldyn.app.cli import main
 from nldyn.base.resources import example
+from nldyn.io import CheckpointFile
 from nldyn.io.branches import load_branches, load_diagram, load_exploration
 from nldyn.io.curves import load_curves
 from nldyn.runtime.unfinished import unfinished_path

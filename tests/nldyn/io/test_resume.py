@@ -13,7 +13,6 @@ from branches_alike import assert_same_branches
 
 from nldyn import (
     Branch,
-    CheckpointFile,
     ContinuationOptions,
     HarmonicForce,
     Stop,
@@ -28,6 +27,7 @@ from nldyn import (
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.endings import Ending
+from nldyn.io import CheckpointFile
 from nldyn.io.branches import load_branches
 from nldyn.runtime import keeper
 from nldyn.runtime.result_directory import OutputError
@@ -199,7 +199,8 @@ def test_every_checkpoint_on_the_way_goes_on_to_the_same_branch(
 
 KILLED = """
 import os, signal
-from nldyn import CheckpointFile, continue_branch, solve_orbit
+from nldyn import continue_branch, solve_orbit
+from nldyn.io import CheckpointFile
 from nldyn.runtime import keeper
 from problems import make_one_dof
 

@@ -11,18 +11,11 @@ import numpy as np
 import pytest
 from branches_alike import assert_same_branches, without
 
-from nldyn import (
-    CheckpointFile,
-    ClosedWalks,
-    ContinuationOptions,
-    Mixtures,
-    PseudoOrbits,
-    SystemModelError,
-    extend_diagram,
-    save,
-)
+from nldyn import ContinuationOptions, SystemModelError, extend_diagram, save
 from nldyn.branches.checkpoint import Checkpoint
+from nldyn.io import CheckpointFile
 from nldyn.io.branches import load_branches, save_branches
+from nldyn.search import ClosedWalks, Mixtures, PseudoOrbits
 from nldyn.search.diagram import Collector
 
 WAYS = {

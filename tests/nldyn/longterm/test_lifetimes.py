@@ -9,7 +9,8 @@ import pytest
 from problems import make_one_dof
 from scipy.stats import poisson
 
-from nldyn import SystemModelError, chaos_lifetime, classify_attractor
+from nldyn import SystemModelError, classify_attractor
+from nldyn.longterm import chaos_lifetime
 from nldyn.longterm.attractors import Attractor, AttractorOptions
 from nldyn.longterm.lifetimes import LOOK, ChaosLifetime, _ended
 

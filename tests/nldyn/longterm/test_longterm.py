@@ -15,33 +15,35 @@ from nldyn import (
     ExploreOptions,
     FlowMap,
     HarmonicForce,
-    OrbitSearchOptions,
     StatePlane,
     Stop,
     System,
     SystemModelError,
-    basin_edge,
     basins,
-    brute_force,
     classify_attractor,
-    contact_measures,
     continue_branch,
     find_attractors,
     harmonics,
-    impact_section,
     impacts,
     simulate,
     solve_orbit,
-    spectra_map,
-    stable_manifold,
-    stroboscopic_section,
     sweep,
 )
 from nldyn.base.errors import ConvergenceError
+from nldyn.longterm import (
+    basin_edge,
+    brute_force,
+    contact_measures,
+    impact_section,
+    spectra_map,
+    stable_manifold,
+    stroboscopic_section,
+)
 from nldyn.longterm.attractors import Attractor, AttractorOptions, zero_one_test
 from nldyn.longterm.basins import settle, target_of
-from nldyn.longterm.contact_measures import measures_table, power_spectrum, spectra_table
+from nldyn.longterm.measures import measures_table, power_spectrum, spectra_table
 from nldyn.longterm.poincare import BruteForce, Column
+from nldyn.orbits import OrbitSearchOptions
 from nldyn.plot.longterm import (
     plot_basins,
     plot_brute_force,

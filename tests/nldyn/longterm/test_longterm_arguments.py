@@ -11,26 +11,27 @@ from nldyn import (
     StatePlane,
     System,
     SystemModelError,
-    basin_edge,
     basins,
+    find_attractors,
+    impacts,
+    lyapunov_exponents,
+    simulate,
+    solve_orbit,
+    sweep,
+)
+from nldyn.longterm import (
+    basin_edge,
     brute_force,
     chaos_lifetime,
     contact_measures,
-    find_attractors,
     impact_section,
-    impacts,
-    lyapunov_exponents,
-    run_all,
-    simulate,
-    solve_orbit,
     spectra_map,
     stable_manifold,
     stroboscopic_section,
-    sweep,
 )
 from nldyn.longterm.attractors import AttractorOptions, zero_one_test
-from nldyn.longterm.contact_measures import measures_table, power_spectrum
 from nldyn.longterm.lyapunov import standard_errors
+from nldyn.longterm.measures import measures_table, power_spectrum
 from nldyn.plot.longterm import (
     plot_basins,
     plot_brute_force,
@@ -38,6 +39,7 @@ from nldyn.plot.longterm import (
     plot_spectra,
     plot_sweep,
 )
+from nldyn.runtime import run_all
 
 JUNK = (None, "nonsense", {"a": 1}, math.nan, -1, 10**400, object(), np.zeros(3), 1j)
 

@@ -24,9 +24,9 @@ from nldyn import (
     continue_branch,
     continue_special,
     describe_special,
-    refine_special,
     solve_orbit,
 )
+from nldyn.curves import refine_special
 from nldyn.orbits.orbit import Orbit
 
 STIFFNESS, PRELOAD = 1.0, 1.0

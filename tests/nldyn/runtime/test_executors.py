@@ -21,23 +21,19 @@ from nldyn import (
     StatePlane,
     Stop,
     SystemModelError,
-    basin_edge,
     basins,
-    brute_force,
     classify_attractor,
-    contact_measures,
     find_attractors,
     impacts,
     lyapunov_exponents,
-    run_all,
     simulate,
     solve_orbit,
-    stable_manifold,
     sweep,
 )
 from nldyn.base.resources import example
-from nldyn.longterm.contact_measures import measures_table
-from nldyn.runtime import executors
+from nldyn.longterm import basin_edge, brute_force, contact_measures, stable_manifold
+from nldyn.longterm.measures import measures_table
+from nldyn.runtime import executors, run_all
 from nldyn.runtime.executors import TaskError, as_finished
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene

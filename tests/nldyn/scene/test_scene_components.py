@@ -18,7 +18,7 @@ from nldyn.scene.backbone import undamped
 from nldyn.scene.build import build_parts, build_reduced, build_system
 from nldyn.scene.case_fingerprints import case_fingerprints
 from nldyn.scene.read import load_scene, parse_scene
-from nldyn.system.rest import rest
+from nldyn.system.equilibrium import rest
 
 E, RHO, B, H, L = 2.1e11, 7800.0, 0.03, 0.01, 0.75
 STEEL = fem.BeamPart(fem.Material(E, RHO), fem.RectangularSection(B, H))

@@ -12,8 +12,8 @@ from nldyn.scene.checks import check_computable
 from nldyn.scene.component import build_component
 from nldyn.scene.read import load_scene, parse_scene
 from nldyn.scene.run import compute
+from nldyn.system.equilibrium import rest
 from nldyn.system.measured import measured_force
-from nldyn.system.rest import rest
 
 E, RHO, B, H, L = 2.1e11, 7800.0, 0.03, 0.01, 1.5
 MESH = """$MeshFormat

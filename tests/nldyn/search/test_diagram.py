@@ -18,9 +18,7 @@ from nldyn import (
     Diagram,
     FlowMap,
     HarmonicForce,
-    OrbitSearchOptions,
     Stop,
-    SubharmonicSeed,
     System,
     SystemModelError,
     Unbalance,
@@ -30,8 +28,10 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.branches.continuation import open_ends
+from nldyn.orbits import OrbitSearchOptions
 from nldyn.orbits.orbit import minimal_period, same_orbit, stroboscopic
 from nldyn.orbits.starts import orbit_beside, orbit_near
+from nldyn.search import SubharmonicSeed
 from nldyn.search.diagram import shortened
 
 # where the paper's text sees subharmonics: 1/3 near 37.1, 1/5 near 62.2, 1/7 near 58, 1/13 near 81

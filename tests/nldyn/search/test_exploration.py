@@ -12,7 +12,6 @@ from branches_alike import assert_same_branches
 from problems import THREE_HZ, between_stops
 
 from nldyn import (
-    CheckpointFile,
     ContinuationOptions,
     ExploreOptions,
     FlowMap,
@@ -37,6 +36,7 @@ from nldyn.base.resources import example
 from nldyn.bifurcations.normal_forms import switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.branches import at_frequency as crossings
+from nldyn.io import CheckpointFile
 from nldyn.io.branches import load_branches, load_diagram, load_exploration
 from nldyn.orbits.deflation import deflated_orbit
 from nldyn.orbits.orbit import stroboscopic

@@ -10,11 +10,7 @@ from branches_alike import without
 from problems import THREE_HZ, between_stops, make_one_dof
 
 from nldyn import (
-    CheckpointFile,
-    ClosedWalks,
     Diagram,
-    Mixtures,
-    PseudoOrbits,
     SystemModelError,
     continue_branch,
     extend_diagram,
@@ -23,8 +19,10 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.branches.endings import Ending
+from nldyn.io import CheckpointFile
 from nldyn.io.branches import load_branches, load_diagram
 from nldyn.paper.jobs import scene_system
+from nldyn.search import ClosedWalks, Mixtures, PseudoOrbits
 from nldyn.search.exploration import steps_between
 from nldyn.search.fixed_point_index import index_gaps
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nldyn import Mixtures
+from nldyn.search import Mixtures
 from nldyn.search import mixtures as crossover
 from nldyn.search.extend import PLACES, WINDOW, Place, collector_beside, orbits_near
 from nldyn.search.mixtures import BEYOND, NEIGHBOURS, Loops

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from problems import make_one_dof
 
-from nldyn import ClosedWalks, Stop
+from nldyn import Stop
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.orbit import stroboscopic
+from nldyn.search import ClosedWalks
 from nldyn.search.extend import WINDOW, Place, orbits_near
 from nldyn.search.random_walks import (
     LEAST,

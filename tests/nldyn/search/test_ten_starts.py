@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from problems import RANGE_HZ
 
-from nldyn import ContinuationOptions, OrbitSearchOptions, continue_branch, find_orbits, solve_orbit
+from nldyn import ContinuationOptions, continue_branch, find_orbits, solve_orbit
+from nldyn.orbits import OrbitSearchOptions
 from nldyn.paper.jobs import scene_system
 
 STARTS = {

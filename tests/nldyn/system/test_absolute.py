@@ -74,7 +74,7 @@ def test_simulations_and_sections_follow_the_base():
     motion = nldyn.simulate(shaken(base), HZ, periods=5, transient=200)
     exact = amplitude * transmitted(OMEGA) * -1j
     assert motion.period_peaks()[1] == pytest.approx(abs(exact) * np.ones(5), rel=1e-7)
-    y, v = nldyn.stroboscopic_section(motion)
+    y, v = nldyn.longterm.stroboscopic_section(motion)
     assert y == pytest.approx(exact.real * np.ones(6), rel=1e-7)
     assert v == pytest.approx((1j * OMEGA * exact).real * np.ones(6), rel=1e-7)
     told = motion.history(100).displacement["mass absolute"]

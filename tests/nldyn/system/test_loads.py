@@ -31,7 +31,7 @@ from nldyn import (
 from nldyn.base.resources import example
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene
-from nldyn.system.rest import closed_at_rest, rest
+from nldyn.system.equilibrium import closed_at_rest, rest
 
 HZ = 3.0
 OMEGA = 2 * np.pi * HZ

@@ -19,7 +19,7 @@ from nldyn import (
     find_orbits,
     solve_orbit,
 )
-from nldyn.system.rest import rest, rest_positions, tangent_stiffness
+from nldyn.system.equilibrium import rest, rest_positions, tangent_stiffness
 
 OWN = 20.0 * math.pi  # rad/s
 

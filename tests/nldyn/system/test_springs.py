@@ -9,23 +9,14 @@ from click.testing import CliRunner
 from independent import Motion
 
 import nldyn
-from nldyn import (
-    CubicDamper,
-    Damper,
-    FlowMap,
-    HarmonicForce,
-    Parameter,
-    PolynomialSpring,
-    Spring,
-    Stop,
-    System,
-)
+from nldyn import Damper, FlowMap, HarmonicForce, Parameter, PolynomialSpring, Spring, Stop, System
 from nldyn.app.cli import main
 from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.base.resources import example
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene, parse_scene
-from nldyn.system.rest import rest, rest_positions
+from nldyn.system import CubicDamper
+from nldyn.system.equilibrium import rest, rest_positions
 
 UNITS = {f"m{i}": np.eye(6)[i].tolist() for i in range(6)}
 

@@ -115,7 +115,8 @@ def contact_measures(
 
     Examples
     --------
-    >>> from nldyn import Stop, System, Unbalance, contact_measures, solve_orbit
+    >>> from nldyn import Stop, System, Unbalance, solve_orbit
+    >>> from nldyn.longterm import contact_measures
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])

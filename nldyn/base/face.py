@@ -1,0 +1,36 @@
+"""The face of a package: one list of names, which are loaded when they are first asked for."""
+
+import ast
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+
+def homes(package: str, folder: Path) -> dict[str, str]:
+    """Modules of the names in a package's stub; a sub-package that it lists is its own home."""
+    stub = ast.parse((folder / "__init__.pyi").read_text(encoding="utf-8"))
+    return {
+        name.name: f"{package}.{name.name}" if node.module == package else str(node.module)
+        for node in stub.body
+        if isinstance(node, ast.ImportFrom)
+        for name in node.names
+    }
+
+
+def face(
+    package: str, folder: Path
+) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
+    """``__getattr__``, ``__dir__`` and ``__all__`` of a package whose stub lists its names.
+
+    Sub-packages are attributes, but no part of ``__all__``.
+    """
+    known = homes(package, folder)
+
+    def load(name: str) -> object:
+        if name not in known:
+            raise AttributeError(f"module '{package}' has no attribute '{name}'")
+        module = import_module(known[name])
+        return module if known[name] == f"{package}.{name}" else getattr(module, name)
+
+    names = sorted(name for name, home in known.items() if home != f"{package}.{name}")
+    return load, lambda: sorted(known), names

@@ -1,0 +1,7 @@
+"""What is computed: the names that are not in the face of nldyn."""
+
+from nldyn.system.equilibrium import closed_at_rest as closed_at_rest
+from nldyn.system.equilibrium import rest as rest
+from nldyn.system.equilibrium import rest_positions as rest_positions
+from nldyn.system.measured import MeasuredForce as MeasuredForce
+from nldyn.system.springs_dampers import CubicDamper as CubicDamper
