@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import TINY, Real
 from nldyn.flow.kernels.compiling import inner, njit
 from nldyn.orbits import critical_functions
-from nldyn.orbits.critical_functions import number_outside, travel
+from nldyn.orbits.critical_functions import NEAR_CIRCLE, number_outside, travel
 from nldyn.orbits.periodic_schur import product_eigenvalues
 from nldyn.runtime.kernel_cache import resting_on
 
@@ -100,7 +100,7 @@ def meetings(before, after, way, error_before, error_after, coarse):
     for i in range(before.size):
         mu = before[i]
         height = distance(mu)
-        if mu.imag < 0.0 or abs(height) > 0.4:
+        if mu.imag < 0.0 or abs(height) > NEAR_CIRCLE:
             continue
         j = closest(after, mu)
         step, later = abs(after[j] - mu), distance(after[j])
@@ -151,7 +151,7 @@ def doubtful(sigmas, sets, error):
                 if k > 0:
                     at = closest(sets[now], sets[now + 1 if backward else now - 1][at])
                 size = error * sigmas[now] * (1.0 - sigmas[now])
-                ratios[k] = distance(sets[now][at]) / max(size, 1e-300)
+                ratios[k] = distance(sets[now][at]) / max(size, TINY)
             k = doubtful_in(ratios)
             if k >= 0:
                 now = m - 1 - k if backward else k
@@ -173,7 +173,7 @@ def dips_towards_circle(sets, errors):
         for i in range(n):
             here = distance(sets[k][i])
             size = abs(here)
-            if not errors[k] < size < 0.4:
+            if not errors[k] < size < NEAR_CIRCLE:
                 continue
             before = distance(sets[k - 1][closest(sets[k - 1], sets[k][i])])
             after = distance(sets[k + 1][closest(sets[k + 1], sets[k][i])])

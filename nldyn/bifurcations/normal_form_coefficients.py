@@ -30,6 +30,10 @@ STEPS = 8
 ENOUGH = 1e-6  # relative error of a coefficient that needs no more steps
 SAFETY = 3.0  # times the error seen in a table of differences, of which rounding is a part
 LEAST_ERROR = 1e-8  # relative, of a coefficient: special points are located no better
+DOUBLE = 1e-14  # cosine of left and right vectors, below which a multiplier is double
+NOT_NEAR = 0.1  # least over largest singular value, above which no critical orbit is near
+SOLVED = 1e-10  # last step of Newton's method, relative to the orbit
+PLAIN = 0.01  # part of the frequency's derivative along the critical vector: no crossing is near
 
 Evaluation = tuple[Real, Real, Hashable]
 Vectors = NDArray[Any]  # real or complex
@@ -120,7 +124,7 @@ class Loop:
         if mu.imag == 0.0:  # the same sign whatever the linear algebra library
             q = q * np.sign(q.flat[np.argmax(np.abs(q))])
         product = np.einsum("ji,jil,jl->", y, self.jacobians, q) / len(q)
-        if abs(product) < 1e-14 * np.linalg.norm(y) * np.linalg.norm(q):
+        if abs(product) < DOUBLE * np.linalg.norm(y) * np.linalg.norm(q):
             raise CoefficientError("the critical multiplier is double")
         return q, y / product
 
@@ -289,7 +293,7 @@ def correct_across(
         matrix = operator(found.jacobians, 1.0)
         if q is None:
             left, values, right = np.linalg.svd(matrix)
-            if values[-1] > 0.1 * values[0]:
+            if values[-1] > NOT_NEAR * values[0]:
                 return None
             q, y = right[-1], left[:, -1]
         bordered[:size, :size], bordered[:size, size] = matrix, omega * found.d_omega.ravel()
@@ -299,7 +303,7 @@ def correct_across(
         step = np.linalg.solve(bordered, -rest)
         point = point + step[:-1]
         moved = float(np.linalg.norm(step[:size])) / scale
-        if moved < 1e-10:
+        if moved < SOLVED:
             return point, found.jacobians, max(moved, abs(float(step[-1])) / scale)
     return None
 
@@ -316,7 +320,7 @@ def turns_near_crossing(orbit: Orbit) -> bool:
         loop = loop_of(orbit)
         q, y = loop.critical(1.0)
         part = abs(float(np.sum(y * loop.by_parameter)))
-        if part > 1e-2 * float(np.linalg.norm(y) * np.linalg.norm(loop.by_parameter)):
+        if part > PLAIN * float(np.linalg.norm(y) * np.linalg.norm(loop.by_parameter)):
             return False  # a plain fold, at no further cost
         return part < NEAR_CROSSING * abs(mixed_derivative(loop, q, y).value)
     except CoefficientError:
@@ -402,7 +406,7 @@ def fold(loop: Loop) -> tuple[Coefficients, Real]:
         return 0.5 * float(np.einsum("ji,jil,jl->", y, line.differences(h)[0], q))
 
     slope = float(np.sum(y * loop.by_parameter))
-    known = Estimate(slope, 1e-8 * float(np.sum(np.abs(y * loop.by_parameter))))
+    known = Estimate(slope, LEAST_ERROR * float(np.sum(np.abs(y * loop.by_parameter))))
     return Coefficients(known, estimated(quadratic, line)), q
 
 

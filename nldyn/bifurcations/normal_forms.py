@@ -34,7 +34,7 @@ from nldyn.bifurcations.normal_form_coefficients import (
 )
 from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special
 from nldyn.bifurcations.rigid_grazing import rigid_grazing_form
-from nldyn.orbits.conditions import Grazing
+from nldyn.orbits.conditions import AT_NODE, Grazing
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import asymmetry, metric_length
 from nldyn.system.naming import stop_name
@@ -46,6 +46,9 @@ UNCHANGED = 1e-3  # relative change of a null vector that is none
 SIDES = {1: "above", -1: "below"}
 LOST = "the coefficient is lost in its error"
 NUMBERS = {1: "one", 2: "two", 3: "three"}
+SHARES = (1.0, 0.25, 0.05, 0.01, 1e-3, 1e-4)  # of the amplitude, that a branch may need to begin
+DEEPEST = 1e-8  # of the deepest: an extreme as near to the surface grazes with the nearest one
+ALIKE = 0.05  # relative difference of two amplitudes that may be of one place
 
 
 @dataclass(frozen=True)
@@ -190,7 +193,7 @@ def output_change(orbit: Orbit, output: int, phase: float, q: Real) -> tuple[flo
     j = int(np.searchsorted(problem.phases, phase, side="right")) - 1
     j = min(max(j, 0), problem.segments - 1)
     start = float(problem.phases[j])
-    if phase - start < 1e-12:
+    if phase - start < AT_NODE:
         return float(row @ q[j]), carried
     node = problem.nodes(orbit.point)[j]
     found = problem.flow.shoot(node[None], np.array([start, phase]), orbit.omega)
@@ -428,7 +431,7 @@ def _step_off(special: SpecialPoint, direction: Real, amplitude: float) -> Branc
     problem = orbit.problem
     row = problem.metric(orbit.point) * direction
     row /= np.linalg.norm(row)
-    for share in (1.0, 0.25, 0.05, 0.01, 1e-3, 1e-4):
+    for share in SHARES:
         size = share * amplitude
         found = problem.correct(orbit.point + size * direction, row, longest=size)
         if found.converged:
@@ -539,7 +542,7 @@ def touching(orbit: Orbit) -> list[tuple[int, float, bool]]:
             )
         ]
     found.sort()
-    limit = 1e-8 * max((entry[0] for entry in found), default=0.0)
+    limit = DEEPEST * max((entry[0] for entry in found), default=0.0)
     return [entry[1:] for number, entry in enumerate(found) if number == 0 or entry[0] < limit]
 
 
@@ -553,7 +556,7 @@ def _stability_at_grazing(special: SpecialPoint, others: Sequence[SpecialPoint])
         for other in others
         if other.kind != "GR"
         and abs(other.frequency_hz / special.frequency_hz - 1.0) < CLOSE
-        and abs(other.orbit.max_abs_displacement / special.orbit.max_abs_displacement - 1.0) < 0.05
+        and abs(other.orbit.max_abs_displacement / special.orbit.max_abs_displacement - 1.0) < ALIKE
     ]
     said = "The force sets in softly, so the multipliers are continuous and stability stays"
     if close:

@@ -14,6 +14,10 @@ from nldyn.orbits.newton import refine
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import ShootingProblem, metric_length
 
+OPPOSITE = 0.8  # cosine from which two differences of halves point opposite ways
+SHARES = (1.0, 0.25, 0.05, 0.01, 2e-3, 4e-4)  # of the amplitude, that a branch may need to begin
+NEAR_ONE = 0.3  # distance of a multiplier from 1 on a branch that has just begun
+
 
 def passed_flip(a: Orbit, b: Orbit) -> bool:
     """Whether an even-period orbit turned into its own shift: a branch of half the period met.
@@ -25,7 +29,7 @@ def passed_flip(a: Orbit, b: Orbit) -> bool:
     first = half_difference(a.problem, a.point)
     second = half_difference(b.problem, b.point)
     product = float(first @ second)
-    return product < -0.8 * float(np.linalg.norm(first) * np.linalg.norm(second))
+    return product < -OPPOSITE * float(np.linalg.norm(first) * np.linalg.norm(second))
 
 
 def flip_between(a: BranchNode, b: BranchNode) -> BranchNode:
@@ -115,7 +119,7 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchNode
     direction /= metric_length(weights, direction)
     row = weights * direction
     first: BranchNode | None = None
-    for share in (1.0, 0.25, 0.05, 0.01, 2e-3, 4e-4):
+    for share in SHARES:
         size = share * amplitude
         found = problem.correct(doubled + size * direction, row / np.linalg.norm(row))
         if found.converged:
@@ -123,7 +127,8 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchNode
             if minimal_period(twin) < problem.period:
                 continue
             first = BranchNode(twin, problem.tangent(found, direction), 0.0)
-            if twin.impacts == 2 * orbit.impacts and np.abs(twin.multipliers - 1.0).min() < 0.3:
+            near = np.abs(twin.multipliers - 1.0).min() < NEAR_ONE
+            if twin.impacts == 2 * orbit.impacts and near:
                 break
     if first is not None:
         return first

@@ -28,6 +28,7 @@ CLOSE = 0.01  # part of a step within which a point beside it does not help
 FAR_ALONE = 0.3  # the same of the only pair of a single mode
 MOST_BENT = 10.0  # times that points may lie apart farther than their arclength says
 DIVES = 8  # points at which to look for a change of sign between two others
+WITHIN = 0.02  # share of a step next to its ends, in which no point is put
 
 
 def special_points_between(
@@ -220,7 +221,7 @@ def turned_over(
         span = last.arclength - first.arclength
         if abs(span) < 1e-6:
             return None
-        sigma = min(max((where - first.arclength) / span, 0.02), 0.98)
+        sigma = min(max((where - first.arclength) / span, WITHIN), 1.0 - WITHIN)
         extra = Chord(first, last).at(sigma)
         if differs(a, extra):
             return None if lies_on_crossing(extra.orbit, ON_CROSSING) else extra

@@ -51,6 +51,10 @@ MOST_BEHIND = 4  # points behind the last one that tell where a branch goes on
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
 SAME_PLACE = 1e-8  # distance of points that are one, relative to the orbit
+ROOM = 1.1  # times a bound: what is searched, where the bound itself is looked at later
+FARTHEST_OFF = 0.75  # of the largest angle: how far, over the step, a point may lie off the tangent
+NEAR_CROSSING = 0.1  # of the step: a crossing as near as this to its end is passed by another step
+BESIDE_STEP = 0.01  # squared distance from a step, over its own, of what it passes through
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,13 +288,13 @@ class Stepper:
             guess,
             row,
             offset=float(row @ straight),
-            longest=1.1 * self.options.max_miss * step if step > KINK else 2.0 * step,
+            longest=ROOM * self.options.max_miss * step if step > KINK else 2.0 * step,
             max_iterations=FROM_NEAR,
             like=here.orbit.motion,
             aim=cubic,
             # behind a grazing point the branch may turn on a very short length
             closings=self._closings(here.orbit, step),
-            turn=math.cos(1.1 * self.options.max_angle) if step > KINK else 0.0,
+            turn=math.cos(ROOM * self.options.max_angle) if step > KINK else 0.0,
         )
         if not found.converged:
             self._obstacle = found.failure
@@ -317,7 +321,7 @@ class Stepper:
         # a curve that turns by max_angle leaves its tangent by half of that: a longer correction
         # has landed on another branch
         off = metric_length(weights, found.point - straight)
-        if off > 0.75 * self.options.max_angle * step:
+        if off > FARTHEST_OFF * self.options.max_angle * step:
             return None
         tangent = problem.tangent(found, direction)
         cosine = float(direction @ (weights * tangent)) / metric_length(weights, tangent)
@@ -337,7 +341,7 @@ class Stepper:
             and (step > max(crossing, SHORTEST_CROSSING) or not is_crossing(orbit))
         ):
             return None
-        if lies_on_crossing(orbit, min(0.1 * step, ON_CROSSING)):
+        if lies_on_crossing(orbit, min(NEAR_CROSSING * step, ON_CROSSING)):
             return None
         return point, angle, miss
 
@@ -490,13 +494,13 @@ def _passed(a: BranchNode, b: BranchNode, places: Real) -> NDArray[np.bool_]:
     weights = a.orbit.problem.metric(start)
     length2 = float(step @ (weights * step))
     passed = np.zeros(len(places), dtype=bool)
-    near = np.abs(places[:, -1] - start[-1]) <= 1.1 * math.sqrt(length2)  # few are
+    near = np.abs(places[:, -1] - start[-1]) <= ROOM * math.sqrt(length2)  # few are
     if near.any():
         way = places[near] - start
         along = way @ (weights * step)
         off = way - np.outer(along / length2, step)
         inside = (along >= 0.0) & (along <= length2)
-        passed[near] = inside & ((off * off) @ weights < 0.01 * length2)
+        passed[near] = inside & ((off * off) @ weights < BESIDE_STEP * length2)
     return passed
 
 

@@ -21,6 +21,8 @@ from nldyn.orbits.orbit import Orbit, same_orbit, stroboscopic
 SAME = 4e-15  # difference of two logarithms of a frequency that is rounding
 NEARLY_SAME = 1e-12  # the same, of an orbit solved for and not held there
 BESIDE = 2.0  # an orbit further from a chord, in its lengths, is not on the branch between its ends
+SAME_STATE = 1e-5  # of its size: distance of states that are one
+LEFT = 0.0625  # squared distance, over that of the neighbours, of an orbit of another branch
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +91,7 @@ def _chords_beside(places: Places, first: NDArray[np.intp], orbit: Orbit) -> NDA
     twice, n = np.concatenate([target, target]), orbit.period
     away = [np.linalg.norm(line - twice[shift : shift + n], axis=(1, 2)) for shift in range(n)]
     lengths = np.linalg.norm(chords, axis=(1, 2))
-    near: NDArray[np.bool_] = np.min(away, axis=0) <= BESIDE * lengths + 1e-5 * float(
+    near: NDArray[np.bool_] = np.min(away, axis=0) <= BESIDE * lengths + SAME_STATE * float(
         np.linalg.norm(target)
     )
     return near
@@ -199,7 +201,7 @@ def _held(chord: Chord, sigma: float, guess: Real, p: float) -> BranchNode:
     secant = b.orbit.point - a.orbit.point
     weights = problem.metric(a.orbit.point)
     off = found.point - start
-    if float(off @ (weights * off)) > 0.0625 * float(secant @ (weights * secant)):
+    if float(off @ (weights * off)) > LEFT * float(secant @ (weights * secant)):
         raise LocateError("Newton's method left the branch")
     length = a.arclength + sigma * (b.arclength - a.arclength)
     orbit = Orbit.of(problem, found, a.orbit.observe)

@@ -47,6 +47,7 @@ CLOSED = 1e-10  # last step of Newton's method, relative
 MOST_ITERATIONS = 12
 LONGEST_TURN = 0.3  # of the family from one orbit to the next, in rad
 SURELY = 1e-6  # beyond the unit circle, from which an orbit counts as unstable
+UNSEEN = 1e-12  # share of a mode at an interface that is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,7 +256,7 @@ class _Family:
             )
         shape = shapes[:, mode - 1]
         seen = float(shape @ system.participation[self.observe])
-        if abs(seen) <= 1e-12 * np.linalg.norm(system.participation[self.observe]):
+        if abs(seen) <= UNSEEN * np.linalg.norm(system.participation[self.observe]):
             raise SystemModelError(
                 f"mode {mode} does not move interface '{self.observe}': observe another one"
             )

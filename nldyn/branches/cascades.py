@@ -27,6 +27,7 @@ from nldyn.branches.step_control import ContinuationOptions
 
 FEIGENBAUM = 4.669201609102991  # limit of the ratios, Feigenbaum (1978)
 POINTS_BETWEEN = 8  # of a doubled branch up to its flip, if that lies where it is expected
+SHORTEST = 1e-4  # of the longest step: one from which a doubled branch is not followed on
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,6 +268,6 @@ def _steps(
         max_step=longest,
         first_step=min(options.first_step, longest),
         grazing_step=min(options.grazing_step, longest),
-        min_step=min(options.min_step, 1e-4 * longest),
+        min_step=min(options.min_step, SHORTEST * longest),
     )
     return longest, shorter

@@ -30,6 +30,7 @@ MOST_DETOUR = 500  # points of such a walk
 STRAIGHT = 1.1  # its length over that of the step, up to which it leads straight there
 TOGETHER = 1e-9  # arclength between two special points that rounding may exchange
 BEYOND = 0.25  # of the step: how far in ln ω one that searches the last may leave the range
+DETOUR_STEPS, DETOUR_GROWTH = 64.0, 8.0  # its first steps in the one it replaces, its longest
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,11 +342,14 @@ def _detour(
     a: BranchNode, b: BranchNode, walk: Stepper, range_hz: tuple[float, float]
 ) -> list[BranchNode] | None:
     """Points of a walk with shorter steps from a that passes b in its direction, or None."""
-    first_step = (b.arclength - a.arclength) / 64.0
+    first_step = (b.arclength - a.arclength) / DETOUR_STEPS
     if first_step < max(SHORTEST_DETOUR, walk.options.min_step):
         return None
     options = replace(
-        walk.options, first_step=first_step, max_step=8.0 * first_step, max_points=MOST_DETOUR
+        walk.options,
+        first_step=first_step,
+        max_step=DETOUR_GROWTH * first_step,
+        max_points=MOST_DETOUR,
     )
     inner = Stepper(a, range_hz, options, b.orbit.point[None])
     between = list(inner)[1:-1]

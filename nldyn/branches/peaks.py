@@ -13,6 +13,8 @@ from nldyn.bifurcations.point import BranchNode
 from nldyn.branches.branch import Branch
 from nldyn.orbits.orbit import Orbit
 
+WHERE = 1e-4  # of a step: the height of a peak is flat there
+
 
 @dataclass(frozen=True, eq=False)
 class Peak:
@@ -107,7 +109,7 @@ def _refined(around: tuple[BranchNode, ...], sense: float) -> Orbit:
                 lambda x, c=chord: -height(c.at(float(x)).orbit),
                 bounds=(0.0, 1.0),
                 method="bounded",
-                options={"xatol": 1e-4},
+                options={"xatol": WHERE},
             )
             orbit = chord.at(float(found.x)).orbit
         except LocateError:

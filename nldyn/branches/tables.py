@@ -36,6 +36,7 @@ UNITS = {
     "arclength": "1",
     "frequency_error": "1",
 }
+LAST_DIGIT = 1e-14  # relative difference of two frequencies that were meant to be one
 
 
 def orbit_columns(
@@ -84,7 +85,7 @@ def at_known(frequency_hz: float, known_hz: Sequence[float]) -> float:
     >>> at_known(89.99999999999999, (5.0, 90.0)), at_known(89.999, (5.0, 90.0))
     (90.0, 89.999)
     """
-    met = (known for known in known_hz if math.isclose(frequency_hz, known, rel_tol=1e-14))
+    met = (known for known in known_hz if math.isclose(frequency_hz, known, rel_tol=LAST_DIGIT))
     return float(next(met, frequency_hz))
 
 

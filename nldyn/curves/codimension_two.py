@@ -8,7 +8,7 @@ import numpy as np
 
 from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import ConvergenceError
-from nldyn.orbits.bordered import Condition, Evaluation, nearest_depth
+from nldyn.orbits.bordered import CLEAR, Condition, Evaluation, nearest_depth
 from nldyn.orbits.conditions import BranchPointCondition, Grazing, Singular
 from nldyn.orbits.critical_functions import branch_point_test, flip_test, torus_test
 from nldyn.orbits.orbit import Orbit
@@ -179,7 +179,7 @@ def flip_coefficient(orbit: Orbit, left: Real, right: Real) -> float:
 
 def _reach(orbit: Orbit) -> float:
     """Length of a difference that crosses no grazing, relative to the orbit's size."""
-    return min(0.2 * nearest_depth(orbit), DIFFERENCE)
+    return min(CLEAR * nearest_depth(orbit), DIFFERENCE)
 
 
 def _jacobians_beside(orbit: Orbit, direction: Real, h: float) -> tuple[Real, Real]:

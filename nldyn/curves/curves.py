@@ -46,6 +46,7 @@ from nldyn.system.system import System
 CurvePart = Literal["points", "marks"]
 CLOSE = 1e-3  # how far the defining condition of a start may be off
 CROSSES_END = 1e-3  # component of a unit tangent that leads to or from the end of a range
+SAME_VALUE = 1e-8  # relative difference of parameters of one place
 
 
 class CurveFile(Protocol):
@@ -623,7 +624,8 @@ def _marked(points: Sequence[CurvePoint]) -> tuple[list[LocatedPoint], list[str]
 
 def _same_place(a: CurvePoint, b: CurvePoint) -> bool:
     """Whether two points have the same orbit of the same system."""
-    return np.allclose(a.values, b.values, rtol=1e-8, atol=0.0) and same_orbit(a.orbit, b.orbit)
+    same = np.allclose(a.values, b.values, rtol=SAME_VALUE, atol=0.0)
+    return same and same_orbit(a.orbit, b.orbit)
 
 
 def _start(family: OrbitFamily, orbit: Orbit, condition: Condition) -> CurvePoint:

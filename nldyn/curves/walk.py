@@ -10,10 +10,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import TINY, Real
 from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.bifurcations.period_doubling import passed_flip
-from nldyn.branches.arclength import GRAZES, SLIGHTEST, grazes_rigid, loses_impact
+from nldyn.branches.arclength import (
+    BESIDE_STEP,
+    FARTHEST_OFF,
+    GRAZES,
+    SLIGHTEST,
+    grazes_rigid,
+    loses_impact,
+)
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.curves.codimension_two import codimension_tests, cosine_near, is_torus, torus_cosine
@@ -52,6 +59,7 @@ SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)  # of a step that leads over a phase of shoo
 # The condition of a Neimark-Sacker point holds for neutral saddles, too, and some may be near: the
 # cosine of the pair's angle changes by no more than this from point to point.
 TURN = 0.1
+STRAIGHT_AHEAD = 0.9  # cosine of the way to a corner and the tangent
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +271,7 @@ def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePo
         weights = family.metric(here.point)
         way = found.at.point - here.point
         length = metric_length(weights, way)
-        ahead = float(way @ (weights * here.tangent)) > 0.9 * length
+        ahead = float(way @ (weights * here.tangent)) > STRAIGHT_AHEAD * length
         if not (ahead and length < 10.0 * options.grazing_step):
             return []
         before = float(grazing.value(here.found.at)[0])
@@ -518,7 +526,7 @@ class CurveWalk:
             return None
         miss = metric_length(weights, found.at.point - predicted) / step
         off = metric_length(weights, found.at.point - straight)
-        if miss > self.options.max_miss or off > 0.75 * self.options.max_angle * step:
+        if miss > self.options.max_miss or off > FARTHEST_OFF * self.options.max_angle * step:
             return None
         try:
             there = curve_point(found, here.condition, direction, here.arclength + step)
@@ -574,7 +582,7 @@ class CurveWalk:
             slope, limit = float(here.tangent[place]), chart.high
             if slope < 0.0:
                 limit = chart.low
-            ahead = (chart.coordinate(limit) - float(here.point[place])) / (slope or 1e-300)
+            ahead = (chart.coordinate(limit) - float(here.point[place])) / (slope or TINY)
             if not 0.0 < ahead <= step:
                 continue
             end = _on_plane(here, ahead * here.tangent, ahead, which, chart.coordinate(limit))
@@ -635,7 +643,7 @@ class CurveWalk:
         if float(step @ (weights * origin.tangent)) <= 0.0 or not 0.0 <= along <= length2:
             return False
         off = way - along / length2 * step
-        return float(off @ (weights * off)) < 0.01 * length2
+        return float(off @ (weights * off)) < BESIDE_STEP * length2
 
 
 def is_torus_curve(condition: Condition) -> bool:

@@ -353,7 +353,7 @@ def spectra_map(
     Returns
     -------
     SpectraMap
-        What `nldyn.plot.diagram.plot_spectra` draws.
+        What `nldyn.plot.plot_spectra` draws.
 
     Raises
     ------

@@ -55,6 +55,10 @@ ROUNDING = 1e-7  # a Newton step below this that is no shorter than the last has
 KEEP_SLOPES = 1e-3  # after a Newton step shorter than this the slopes of g still serve
 CONVERGED = 1e-9  # relative length of a Newton step after which to stop
 SATISFIED = 1e-7  # residual of a condition up to which a solution counts
+CLEAR = 0.2  # of the way to the nearest grazing: a difference that does not reach it
+FAST, STAGNANT = 0.1, 0.3  # rates of Newton's steps: slopes are kept; rounding is all that is left
+SINGULAR = 1e-14  # least over largest pivot of a Jacobian without a tangent
+SHORTER = 0.2  # of the length that the change would allow: the next difference
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,7 +363,7 @@ class Free:
 def reach_of_grazing(at: Evaluation) -> float:
     """Length of a difference that does not carry an extreme of a penetration through zero."""
     depth = nearest_depth(at.orbit)
-    return min(max(0.2 * depth, SHORTEST_DIFFERENCE), DIFFERENCE)
+    return min(max(CLEAR * depth, SHORTEST_DIFFERENCE), DIFFERENCE)
 
 
 def nearest_depth(orbit: Orbit) -> float:
@@ -465,7 +469,7 @@ def correct(
     slopes = None
     for iteration in range(1, max_iterations + 1):
         try:
-            if not (step < KEEP_SLOPES and step < 0.1 * before):
+            if not (step < KEEP_SLOPES and step < FAST * before):
                 slopes = None
             before = step
             change, slopes = _newton_step(family.at(point), condition, slopes, row, level)
@@ -473,7 +477,7 @@ def correct(
             point = point + change
             if not step < 2.0:
                 raise ConvergenceError("Newton's method diverged")
-            if step <= CONVERGED or (step < ROUNDING and step > 0.3 * before):
+            if step <= CONVERGED or (step < ROUNDING and step > STAGNANT * before):
                 found = Corrected(family.at(point), condition, step, iteration, "")
                 if found.residual(condition) < SATISFIED:
                     return found
@@ -517,7 +521,7 @@ def tangent_surface(at: Evaluation) -> tuple[Real, Real]:
     n = family.n_states
     unit = 1.0 / np.sqrt(family.metric(at.point))
     q, r = np.linalg.qr((at.jacobian * unit).T, mode="complete")
-    if np.abs(np.diag(r)).min() < 1e-14 * np.abs(r).max():
+    if np.abs(np.diag(r)).min() < SINGULAR * np.abs(r).max():
         raise ConvergenceError("singular Jacobian")
     normal = q[:, :n] @ solve_triangular(r[:n], -at.residual, trans="T")
     return unit * normal, unit[:, None] * q[:, n:]
@@ -537,7 +541,7 @@ def _slope(at: Evaluation, direction: Real, condition: Condition, here: Real) ->
         change = float(np.abs(last - first).max(initial=0.0))
         bend = float(np.abs(last - 2.0 * here + first).max(initial=0.0))
         if change > LARGEST_CHANGE and h > SHORTEST_DIFFERENCE:
-            h = max(0.2 * LARGEST_CHANGE / change * h, SHORTEST_DIFFERENCE)
+            h = max(SHORTER * LARGEST_CHANGE / change * h, SHORTEST_DIFFERENCE)
         elif bend > max(BENT * change, ROUNDING_BEND) and h > SHORTEST_BEND:
             h = max(0.5 * BENT * change / bend * h, SHORTEST_BEND)
         else:

@@ -43,6 +43,9 @@ ALL_GRAZE = 1e-4  # of an orbit's size: depth in each excitation period that gra
 CLEAR = 1e-12  # of an orbit's size: distance to a rigid stop that counts as none, and is no impact
 WIDEST_PASSAGE = 0.5  # rad on either side of a grazing, in which a rigid stop is not there
 SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
+FARTHEST = 0.01  # of the orbit's size: depth of an extreme that may be said to graze
+SAME_EXTREME = 0.2  # rad between two extremes that are one on neighbouring orbits
+AT_NODE = 1e-12  # rad from a node of shooting, at which an extreme has the state of that
 
 Monitor = str | Callable[[Orbit], float]
 
@@ -230,7 +233,7 @@ class Grazing:
             If the orbit has none within 1 % of its size.
         """
         unit = length_unit(orbit)
-        best, shortest = None, 1e-2 * unit
+        best, shortest = None, FARTHEST * unit
         for stop in range(len(orbit.system.stops)):
             found = orbit.touches(stop)
             rigid = isinstance(orbit.system.stops[stop], RigidStop)
@@ -288,7 +291,7 @@ class Grazing:
         """Whether an extreme near a phase is this one."""
         full = 2.0 * math.pi * period
         apart = abs((phase - self.phase + 0.5 * full) % full - 0.5 * full)
-        return stop == self.stop and is_maximum == self.is_maximum and apart < 0.2
+        return stop == self.stop and is_maximum == self.is_maximum and apart < SAME_EXTREME
 
     def extreme(self, orbit: Orbit) -> tuple[float, float]:
         """Phase and depth of the extreme."""
@@ -345,7 +348,7 @@ def _flown_to(orbit: Orbit, phase: float, sensitivities: bool) -> tuple[int, Seg
     phases = problem.phases
     phase = phase % phases[-1]
     j = min(int(np.searchsorted(phases, phase, side="right")) - 1, problem.segments - 1)
-    if phase - phases[j] <= 1e-12:
+    if phase - phases[j] <= AT_NODE:
         return j, None
     node = problem.nodes(orbit.point)[j]
     found = problem.flow.shoot(

@@ -8,6 +8,9 @@ import numpy as np
 
 from nldyn.flow.kernels.compiling import inner, njit
 
+NEAR_CIRCLE = 0.4  # distance from the unit circle, within which a multiplier may cross it soon
+LEAST_MODULUS = 1e-3  # that has a logarithm here: far inside
+
 
 @njit(cache=True, error_model="numpy")
 def flip_test(multipliers):
@@ -62,7 +65,7 @@ def travel(before, after):
     """Longest way of a multiplier near the unit circle to the nearest one of the next orbit."""
     longest = 0.0
     for mu in before:
-        if abs(math.log(max(abs(mu), 1e-3))) < 0.4:
+        if abs(math.log(max(abs(mu), LEAST_MODULUS))) < NEAR_CIRCLE:
             shortest = np.inf
             for other in after:
                 shortest = min(shortest, abs(other - mu))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import TINY, Real
 from nldyn.base.errors import ConvergenceError
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.newton import refine, spread
@@ -17,6 +17,7 @@ from nldyn.orbits.starts import GUESS_ITERATIONS
 
 LONGEST = 0.5  # step of an iteration, relative to the orbit
 ITERATIONS = 20
+FOUND, WITHIN = 1e-4, 0.1  # last step, over the orbit's size and the way to the nearest known one
 
 
 def deflated_orbit(
@@ -43,7 +44,7 @@ def deflated_orbit(
         if not math.isfinite(length):
             return None
         away = min((float(np.linalg.norm(point[:-1] - x)) / size for x in repelled), default=1.0)
-        if length == 0.0 or length < min(1e-4, 0.1 * away):
+        if length == 0.0 or length < min(FOUND, WITHIN * away):
             break
         stretch = _stretch(point[:-1], step[:-1], repelled, size)
         point = point + step * math.copysign(min(abs(stretch), LONGEST / length), stretch)
@@ -63,6 +64,6 @@ def _stretch(x: Real, step: Real, repelled: Sequence[Real], size: float) -> floa
     slope = 0.0
     for other in repelled:
         away = (x - other) / size
-        square = float(away @ away) or 1e-300
+        square = float(away @ away) or TINY
         slope += -2.0 * float(away @ step) / size / (square * (1.0 + square))
     return 1.0 / (1.0 - slope) if slope != 1.0 else 1.0

@@ -41,6 +41,7 @@ SAME_PHASE = 1e-9  # in rad: an extreme and an impact
 SAME = 1e-5  # distance of orbits that are one, relative to their size
 REPEATS = 1e-6  # the same of an orbit from itself some periods later
 SHALLOW = 1e-3  # of the deepest extreme: depths up to it are told exactly where stops are touched
+LARGEST_EXPONENT = 700.0  # of a finite exponential
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +295,8 @@ class Orbit:
         exact -= contact_damping(self.problem.flow, self.trajectory)
         if math.isinf(exact):  # at rest on a rigid stop, or without rebound: directions are lost
             return math.nan
-        return math.inf if math.isnan(value) else abs(math.expm1(min(value - exact, 700.0)))
+        off = min(value - exact, LARGEST_EXPONENT)
+        return math.inf if math.isnan(value) else abs(math.expm1(off))
 
     @cached_property
     def trajectory(self) -> Trajectory:

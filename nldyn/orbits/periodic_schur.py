@@ -20,6 +20,12 @@ from nldyn.flow.kernels.compiling import allocating, inner, njit
 EPS = 2.0**-52
 MAX_STEPS = 150  # for one or two eigenvalues; three or four are usual, thirty at a triple one
 PATIENCE = 50  # steps before entries at the rounding level of a factor count as zero
+ANY_NUMBER, HALF_RANGE = 4000.0, 2000.0  # powers of 2 that take any number, and one near 1, to 0
+SQUARE_LOST = 1e-150  # a length whose square underflows
+FEW = 16.0  # roundings of a factor, within which an entry counts as zero in the end
+SMALL, LARGE = 1e-30, 1e30  # entries of a product, from which on powers of 2 are taken out of it
+LEAST, MOST = 1e-250, 1e250  # size of a start, beyond which the step loses its direction
+OTHER_START = (1.0, 0.7, -0.4)  # of an exceptional step: any that is in no way special
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -78,7 +84,7 @@ def logarithm(value, exponent):
 @inner
 def powered(value, exponent):
     """The value times 2^exponent, an exponent that may be too large for `ldexp`."""
-    power = int(min(max(exponent, -4000.0), 4000.0))
+    power = int(min(max(exponent, -ANY_NUMBER), ANY_NUMBER))
     return complex(math.ldexp(value.real, power), math.ldexp(value.imag, power))
 
 
@@ -115,7 +121,7 @@ def rotation(a, b):
     if b == 0.0:
         return 1.0, 0.0
     r = math.sqrt(a * a + b * b)
-    if r < 1e-150:
+    if r < SQUARE_LOST:
         r = math.hypot(a, b)
     return a / r, b / r
 
@@ -243,7 +249,7 @@ def deflate_all(A, values, exponents):
             pair(A, lo, values, exponents)
             squeeze = min(squeeze, pair_squeeze(A, lo), smallest(A, lo), smallest(A, hi))
             hi, steps = hi - 2, 0
-        elif not split_at_zero(A, lo, hi, 16.0 * EPS if steps > PATIENCE else 0.0):
+        elif not split_at_zero(A, lo, hi, FEW * EPS if steps > PATIENCE else 0.0):
             if steps == MAX_STEPS:
                 return squeeze, False
             double_step(A, lo, hi, steps % 10 == 5, steps % 40 == 39)
@@ -310,7 +316,7 @@ def corner(A, first, last):
                     entry += A[j, first + r, first + q] * P[q, c]
                 P[r, c] = entry
                 largest = max(largest, abs(entry))
-        if 0.0 < largest < 1e-30 or largest > 1e30:
+        if 0.0 < largest < SMALL or largest > LARGE:
             power = math.frexp(largest)[1]
             exponent += power
             for r in range(size):
@@ -362,8 +368,8 @@ def double_step(A, lo, hi, unshifted, exceptional):
     """
     x, y, z = start_of_step(A, lo, hi, unshifted)
     size = max(abs(x), abs(y), abs(z))
-    if exceptional or not 1e-250 < size < 1e250:
-        x, y, z, size = 1.0, 0.7, -0.4, 1.0
+    if exceptional or not LEAST < size < MOST:
+        (x, y, z), size = OTHER_START, 1.0
     x, y, z = x / size, y / size, z / size
     cosine, sine = rotation(y, z)
     turn_around(A, lo + 1, cosine, sine, lo, min(lo + 3, hi), lo, hi)
@@ -389,7 +395,7 @@ def start_of_step(A, lo, hi, unshifted):
     real, imaginary, power = shifts(A, hi)
     if unshifted:
         real, imaginary, power = 0.0, 0.0, exponent
-    power = int(min(max(power - exponent, -2000.0), 2000.0))
+    power = int(min(max(power - exponent, -HALF_RANGE), HALF_RANGE))
     if power > 0:
         a, b = math.ldexp(a, -power), math.ldexp(b, -power)
         c, d, e = math.ldexp(c, -power), math.ldexp(d, -power), math.ldexp(e, -power)

@@ -26,6 +26,7 @@ ITERATIONS = 12  # most Newton steps
 FROM_NEAR = 8  # the same from a point that was predicted or nearly found: more mean it went astray
 LOOSE = 1e-3  # relative length of a last step from which on nothing shows that there is an orbit
 AT_REST = 1e-6  # size of an orbit, relative to the guess, that may be rounding
+MUCH_SMALLER = 0.1  # of the start: an orbit whose steps are to be judged anew
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ class ShootingProblem:
         found = solved(guess, like, guess if aim is None else aim)
         # steps count relative to the start, and may still be large beside a much smaller orbit;
         # motions at rest are not found any better
-        while found.converged and self.scale(found.point) < 0.1 * self.scale(guess):
+        while found.converged and self.scale(found.point) < MUCH_SMALLER * self.scale(guess):
             finer = solved(found.point, None, found.point)
             if not finer.converged and self.scale(found.point) < AT_REST * self.scale(guess):
                 break

@@ -34,6 +34,7 @@ GUESS_ITERATIONS = 10  # Newton steps from a state that may lead nowhere
 LONG_STEPS = 0.5, 14  # of least length: the longest, and how many at most
 SHORT_STEPS = 0.1, 30  # lead to nine in ten of the orbits that 80 lead to
 FREQUENCY_SHIFT = 0.05  # how far the frequency may go, relative
+RETURNS, APART = 0.3, 0.01  # of a motion's size: to where it comes back; between two starts
 
 
 @dataclass(frozen=True)
@@ -362,13 +363,14 @@ def near_returns(states: Real, period: int, count: int) -> list[int]:
     distance = np.linalg.norm(states[period:] - states[:-period], axis=1)
     scale = float(np.linalg.norm(states, axis=1).max()) or 1.0
     before, after = np.append(np.inf, distance[:-1]), np.append(distance[1:], np.inf)
-    returns = np.flatnonzero((distance <= before) & (distance <= after) & (distance < 0.3 * scale))
+    nearest_here = (distance <= before) & (distance <= after)
+    returns = np.flatnonzero(nearest_here & (distance < RETURNS * scale))
     chosen: list[int] = []
     for index in returns[np.argsort(distance[returns], kind="stable")]:
         if len(chosen) == count:
             break
         apart = [np.linalg.norm(states[index] - states[c]) for c in chosen]
-        if all(a > 1e-2 * scale for a in apart):
+        if all(a > APART * scale for a in apart):
             chosen.append(int(index))
     return chosen
 

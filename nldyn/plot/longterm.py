@@ -333,7 +333,7 @@ def plot_wear(
     Parameters
     ----------
     table : mapping of str to (k,) array
-        What `nldyn.measures_table` gave.
+        What `nldyn.longterm.measures_table` gave.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure, free of pyplot, unless given.
     measures : sequence of str

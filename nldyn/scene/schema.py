@@ -891,7 +891,7 @@ class JointTable(Table):
 class Scene(StructureTables):
     """A whole scene: a structure, what acts on it, and what to compute.
 
-    Read one with `nldyn.load_scene`. Units are SI; keys that end in ``_hz`` are in Hz.
+    Read one with `nldyn.scene.load_scene`. Units are SI; keys that end in ``_hz`` are in Hz.
 
     Examples
     --------

@@ -16,6 +16,7 @@ from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import intrinsic, models, register_model
 
+from nldyn.base import arrays
 from nldyn.runtime.kernel_cache import ensure_cache, resting_on
 from nldyn.system import contact_law, linear
 
@@ -23,7 +24,7 @@ ensure_cache()
 
 # the compile cache looks at the file of a function alone, not at those of the kernels it calls
 OURS = sorted(map(str, Path(__file__).parent.glob("*.py")))
-FILES = (*OURS, linear.__file__, contact_law.__file__)
+FILES = (*OURS, arrays.__file__, linear.__file__, contact_law.__file__)
 
 
 class _WithinCallers(JITCodeLibrary):

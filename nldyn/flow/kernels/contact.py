@@ -23,6 +23,7 @@ from nldyn.flow.kernels.law import (
     singular_slope,
 )
 from nldyn.flow.kernels.layout import (
+    BLIND,
     CONTACT_FAILED,
     CREEP,
     DASHPOT,
@@ -32,6 +33,7 @@ from nldyn.flow.kernels.layout import (
     FIRST_POWER,
     FLIGHT,
     GAP,
+    HALF_ULP,
     INSTANT,
     MOBILITY,
     OK,
@@ -54,6 +56,20 @@ from nldyn.flow.kernels.resolution import (
     shows_decay,
     slope_at_end,
 )
+
+LEAST_GUESS = 0.01  # of the peak: penetrations of a first guess where the sine begins and ends
+LEAST_STRAIN = 1e-30  # Legendre tail of a force that a longer panel resolves as well
+SAFETY = 0.9  # of the length that the tail allows the next panel
+LEAST_GROWTH, MOST_GROWTH = 0.5, 1.6  # of a panel's length after the one before
+MOST_LEFT = 0.6  # of a contact that one panel takes to its end; more of it is halved
+ALL_BUT = 0.98  # of the time left: a known panel without an event that fills it ends with it
+PRESSING_ROUNDING = 1e-14  # of its terms: the acceleration against which a rigid stop presses
+AT_ONCE = 1e-12  # of a panel: so near its start, an event happens there
+SHORTER = 0.4  # of a panel that was not solved: the next one tried
+NEAR_END = 1e-3  # of a panel: an event that it aims at and that happens so near its end
+INSTANTS, FARTHEST_END = 5.0, 1e-7  # the same of another event: in errors of its instant, at most
+MISSED = 0.01  # of the panel first tried: no event in one so short means that it is farther off,
+FARTHER = 10.0  # and the next panel is so many times longer
 
 
 @inner
@@ -99,7 +115,7 @@ def profile_guess(tab, kind, h, peak, duration, left, delta_row):
     for i in range(delta_row.size):
         t = h * tab.chi[kind, i]
         x = np.pi * min((duration - left + t) / duration, 1.0)
-        delta_row[i] = max(peak * np.sin(x), 1e-2 * peak)
+        delta_row[i] = max(peak * np.sin(x), LEAST_GUESS * peak)
 
 
 @inner
@@ -266,7 +282,7 @@ def growth_of_panel(fl, tab, panel):
     A Legendre tail of degree m - 1 goes about with that power of the length.
     """
     na, m = panel.F.shape
-    strain = 1e-30
+    strain = LEAST_STRAIN
     for a in range(na):
         if is_bond(fl, panel.active[a]):
             for o in range(a, panel.slope.shape[0], na):
@@ -274,11 +290,11 @@ def growth_of_panel(fl, tab, panel):
                 if top > 0.0:
                     strain = max(strain, legendre_tail(tab, panel.slope, o) / (4.0 * top))
             top = largest(panel.F, a)
-            rounding = 20.0 * panel.depth[1, a] * largest(panel.slope, a)
+            rounding = BLIND * panel.depth[1, a] * largest(panel.slope, a)
             if top > 0.0:
                 strain = max(strain, (legendre_tail(tab, panel.F, a) - rounding) / top)
-    growth = 0.9 * (fl.tail / strain) ** (1.0 / (m - 1))
-    return min(max(growth, 0.5), 1.6)
+    growth = SAFETY * (fl.tail / strain) ** (1.0 / (m - 1))
+    return min(max(growth, LEAST_GROWTH), MOST_GROWTH)
 
 
 @inner
@@ -309,7 +325,7 @@ def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
             if -0.5 * depth / speed < length:
                 ends = False
                 length = -0.5 * depth / speed
-        elif left > min(0.6 * duration, h_mapped):
+        elif left > min(MOST_LEFT * duration, h_mapped):
             if 0.5 * left < length:
                 ends = False
                 length = 0.5 * left
@@ -371,7 +387,7 @@ def first_panel(fl, tab, rec, before, phase, w, h_max, h_mapped, start_switch, p
             if is_bond(fl, panel.active[a]):
                 hold_still(fl, phase, w, a, panel)
         return kind, h, -1
-    if length > h_max or (event < 0 and length > 0.98 * h_max):
+    if length > h_max or (event < 0 and length > ALL_BUT * h_max):
         return kind, h_max, -1
     return kind, length, event
 
@@ -424,7 +440,7 @@ def time_to_event(fl, stop, closed, w, phase):
 @inner
 def pressing_noise(fl, stop, w):
     """Rounding error of the acceleration that a rigid stop takes from what rests on it."""
-    return 1e-14 * output_size(fl, stop, w, 2)
+    return PRESSING_ROUNDING * output_size(fl, stop, w, 2)
 
 
 @inner
@@ -545,7 +561,7 @@ def far_off(fl, phase, w, h, tried, panel, event, where, closed):
     if event < 0:
         return not panel.decay[1].min() > -DECAY
     allowed = 10.0 * coarsest_instant(fl) * h
-    return not (h * where > 1e-12 * tried or at_switch(fl, event, w, phase, allowed, closed))
+    return not (h * where > AT_ONCE * tried or at_switch(fl, event, w, phase, allowed, closed))
 
 
 @allocating
@@ -580,7 +596,7 @@ def contact_panel(
     tried = h
     looked = False
     for attempt in range(100):
-        if h <= 1e-16 * tried or phase + fl.omega * h == phase:
+        if h <= HALF_ULP * tried or phase + fl.omega * h == phase:
             coarse = 10.0 * coarsest_instant(fl) * tried
             if aim < 0 or not at_switch(fl, aim, w, phase, coarse, closed):
                 aim = stop_at_switch(fl, w, phase, tried, closed)
@@ -597,7 +613,7 @@ def contact_panel(
             event, where, doubtful = first_event(fl, tab, kind, phase, w, h, closed, panel, w_end)
             found = not far_off(fl, phase, w, h, tried, panel, event, where, closed)
         if not found:
-            limit = 0.4 * min(h, tried)
+            limit = SHORTER * min(h, tried)
             aim = -1
             kind, h = guess_panel(fl, tab, phase, w, limit, h_mapped, start_switch, panel)
             tried = h
@@ -615,9 +631,9 @@ def contact_panel(
             kind, aim = smooth, -1
             h *= doubtful
             continue
-        near_end = 1e-3
+        near_end = NEAR_END
         if event >= 0 and event != aim:  # so near that `switch_with` will find it
-            near_end = max(min(5.0 * fl.stops[event, INSTANT], 1e-7), 1e-12)
+            near_end = max(min(INSTANTS * fl.stops[event, INSTANT], FARTHEST_END), AT_ONCE)
         at_end = where > 1.0 - near_end
         lost = attempt % 20 == 19  # the instant that is aimed at goes to and fro
         if event >= 0 and (aim < 0 or not at_end) and not lost:
@@ -650,9 +666,9 @@ def contact_panel(
             elif -0.5 * h < dh < h and (dh < 0.0 or h < h_max):
                 h = min(h + dh, h_max)
                 continue
-            elif event < 0 and dh == np.inf and not closed[aim] and h < 1e-2 * tried:
-                keep_profile(fl, tab, kind, kind, 10.0, panel, guess)  # it is farther off than seen
-                h *= 10.0
+            elif event < 0 and dh == np.inf and not closed[aim] and h < MISSED * tried:
+                keep_profile(fl, tab, kind, kind, FARTHER, panel, guess)  # than it was seen
+                h *= FARTHER
                 continue
             elif dh > 0.0 and fine:  # the contact goes on
                 return OK, kind, h, -1

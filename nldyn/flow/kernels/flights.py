@@ -7,8 +7,11 @@ import math
 import numpy as np
 
 from nldyn.flow.kernels.compiling import allocating, always_inline, inner, never_inline
-from nldyn.flow.kernels.layout import GAP, MOST_STEPS, RELEASE, FlowData
+from nldyn.flow.kernels.layout import GAP, MOST_STEPS, RELEASE, SUM_ROUNDING, FlowData
 from nldyn.system.linear import DRIFT, DRIFT_ON, GROWTH, NEAR, STEADY, Terms
+
+LINEAR = 1e-18  # |x|² below which (exp(x) - 1)/x is 1 + x/2 to all digits
+UNMOVED = 1e-14  # of the largest: what a stop pushes a mode by that is rounding
 
 
 @inner
@@ -76,7 +79,7 @@ def from_rest(rate, t):
     """∫ exp(rate u) du from 0 to t for a complex rate, to full precision also where it is small."""
     x, y = rate.real * t, rate.imag * t
     square = x * x + y * y
-    if square < 1e-18:
+    if square < LINEAR:
         return complex(t + 0.5 * t * x, 0.5 * t * y)
     half, size = math.sin(0.5 * y), math.expm1(x)
     real = size * math.cos(y) - 2.0 * half * half
@@ -408,13 +411,13 @@ def output_size(fl, out, w, order):
 @inner
 def output_noise(fl, out, w):
     """Rounding error to expect in an output: 4 units in the last place of its terms."""
-    return 1e-15 * output_size(fl, out, w, 0)
+    return SUM_ROUNDING * output_size(fl, out, w, 0)
 
 
 @inner
 def rate_noise(fl, out, w):
     """The same in the output's rate."""
-    return 1e-15 * output_size(fl, out, w, 1)
+    return SUM_ROUNDING * output_size(fl, out, w, 1)
 
 
 @inner
@@ -426,7 +429,7 @@ def carried_noise(fl, stop, w, phase, depth, h):
         change += h * abs(fl.forced[1 + k, 0, stop]) * rate
     for j in range(w.size):
         change += h * (abs(fl.rows[1, stop, j]) + h * abs(fl.rows[2, stop, j])) * abs(w[j])
-    return 1e-15 * (abs(depth) + change)
+    return SUM_ROUNDING * (abs(depth) + change)
 
 
 @allocating
@@ -434,7 +437,7 @@ def fastest_moved(blocks, force):
     """Largest |eigenvalue|, in 1/s, of the blocks that stops move by more than rounding."""
     fastest, least = 0.0, 0.0
     if force.size > 0:
-        least = 1e-14 * np.abs(force).max()
+        least = UNMOVED * np.abs(force).max()
     for b in range(blocks.shape[0]):
         if not np.abs(force[2 * b : 2 * b + 2]).sum() > least:
             continue
@@ -483,7 +486,7 @@ def safe_step(h, h1, h2, bound):
             break
         step = p / p1
         tau -= step
-        if abs(step) <= 1e-15 * tau:
+        if abs(step) <= SUM_ROUNDING * tau:
             break
     return max(tau, 0.0)
 

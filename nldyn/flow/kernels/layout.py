@@ -36,6 +36,10 @@ HALF_CONTACT = 2.5  # phase of the stiffness of a stop in half a contact, at mos
 # the share of a slope in a Jacobian's error, kick (4 tail)², is less than rtol, (tail / 0.3)², as
 # long as KICK kick is less than one
 KICK = 1.5
+SUM_ROUNDING = 1e-15  # of a sum's terms, 4 units in the last place
+HALF_ULP = 1e-16  # of a number
+BLIND = 20.0  # roundings of a penetration: a Legendre tail within them tells nothing
+MAPPED = 0.75  # share of a panel's length for a map that brings the nodes together at an end
 
 
 class StopRow(NamedTuple):

@@ -44,6 +44,8 @@ from nldyn.flow.kernels.layout import (
 from nldyn.flow.kernels.panel import lu_apply, lu_factor
 from nldyn.flow.kernels.segments import shoot
 
+LAST_DIGITS = 1e-8  # relative step that may go to and fro at the rounding level
+
 
 class Corrector(NamedTuple):
     """What Newton's method for the shooting equations needs to know.
@@ -224,7 +226,8 @@ def newton(
             along[i] = sides[i, 1]
         converged = last <= corrector.rtol and opening <= max(OPEN, noise)
         # the rounding level, or steps to and fro where there is no orbit, across a sharp touch
-        stagnant = last < max(1e-8, noise) and last > 0.5 * before and opening <= max(OPEN, noise)
+        stalls = last < max(LAST_DIGITS, noise) and last > 0.5 * before
+        stagnant = stalls and opening <= max(OPEN, noise)
         if stagnant and opening > max(NOISE, noise):
             stagnant = np.abs(jacobians - known).max() <= STEADY * np.abs(jacobians).max()
         known = jacobians

@@ -21,8 +21,13 @@ from nldyn.flow.kernels.flights import (
     turned,
 )
 from nldyn.flow.kernels.law import closed_law, is_rigid, law, law_by, needs_speed
-from nldyn.flow.kernels.layout import DECAY, GAP, Panel
+from nldyn.flow.kernels.layout import DECAY, GAP, SUM_ROUNDING, Panel
 from nldyn.flow.kernels.resolution import at_end, largest
+
+SETTLED = 1e-10  # of the largest force: its difference from that of its own penetration
+SOLVED = 1e-13  # relative change of the penetrations that Newton's method would still make
+SLOWEST = 1e-3  # 1 - rate of its convergence, at least, in the estimate of that
+STALE = 0.1  # rate from which its matrix is factored anew
 
 
 @allocating
@@ -281,7 +286,7 @@ def consistent(panel, force, noise):
     """Whether the forces (na m,) are those of the penetrations that they lead to."""
     na, m = panel.F.shape
     for a in range(na):
-        allowed = 1e-10 * largest(panel.F, a)
+        allowed = SETTLED * largest(panel.F, a)
         for o in range(a, noise.size, na):
             allowed += 10.0 * noise[o] * largest(panel.slope, o)
         for i in range(m):
@@ -300,7 +305,7 @@ def rounded_force(panel, force, a, i):
         moved = 0.0
         for p in range(na * m):
             moved += abs(panel.G[o * m + i, p] * force[p])
-        error += 1e-15 * moved * abs(panel.slope[o, i])
+        error += SUM_ROUNDING * moved * abs(panel.slope[o, i])
     return error
 
 
@@ -366,13 +371,13 @@ def solve_panel(fl, tab, kind, phase, w, h, noise, panel):
         # the error left: goes with the square after a step with a fresh matrix, else linearly
         # nothing moves where forces are too weak to: they may still not be the penetrations' own
         rate = change / before if change > 0.0 else 0.0
-        left = change * change if fresh else change * rate / max(1.0 - rate, 1e-3)
-        if left <= 1e-13 and (fresh or before < np.inf or change == 0.0):
+        left = change * change if fresh else change * rate / max(1.0 - rate, SLOWEST)
+        if left <= SOLVED and (fresh or before < np.inf or change == 0.0):
             panel_forces(fl, panel, slope)
             if consistent(panel, force, noise):  # that estimate trusts in the order of convergence
                 return True
             rate = 1.0
-        if rate > 0.1:
+        if rate > STALE:
             panel.kept[0] = False
         before = change
     panel.kept[0] = False

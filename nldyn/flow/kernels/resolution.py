@@ -6,19 +6,27 @@ import math
 
 import numpy as np
 
+from nldyn.base.arrays import TINY
 from nldyn.flow.kernels.compiling import allocating, inner
 from nldyn.flow.kernels.law import is_bond, is_rigid, singular_slope
 from nldyn.flow.kernels.layout import (
+    BLIND,
     DECAY,
     EXPONENT,
     FADED,
     HALF_CONTACT,
     KICK,
+    MAPPED,
     MOBILITY,
     REST_TAIL,
     ROUND,
     SHARP_TAIL,
 )
+
+SHALLOW = 16.0  # a lowest point less than so a part of the curvature high all but opens the stop
+DAMPED_TAIL = 0.01  # of the usual one, where a stop damps strongly
+REACH = 0.05  # of the interval: where the next parabola's places lie beside its lowest point
+CLEAR = 0.1  # of the largest: a lowest value above it is not near zero between the places either
 
 
 @inner
@@ -92,7 +100,7 @@ def nearly_opens(tab, kind, values, a, noise):
             )
             if curvature > 0.0:
                 lowest = values[a, i] - 0.25 * slope * slope / curvature
-                if noise < lowest < curvature / 16.0:
+                if noise < lowest < curvature / SHALLOW:
                     return True
     return False
 
@@ -115,7 +123,7 @@ def resolved(fl, tab, kind, h, noise, panel):
     for a in range(na):
         if not is_rigid(fl, panel.active[a]):
             stiffness += fl.stops[panel.active[a], MOBILITY] * largest(panel.slope, a)
-    longest = fl.node_angle * tab.nodes.size * (1.0 if kind == 0 else 0.75 / tab.power)
+    longest = fl.node_angle * tab.nodes.size * (1.0 if kind == 0 else MAPPED / tab.power)
     if h * math.sqrt(stiffness) > max(longest, HALF_CONTACT):
         return False
     slopes = np.empty(panel.slope.shape)
@@ -136,18 +144,18 @@ def resolved(fl, tab, kind, h, noise, panel):
         singular = o < na and singular_slope(fl, panel.active[a])
         if singular and nearly_opens(tab, kind, panel.output, a, 10.0 * noise[a]):
             return False
-        goal = fl.tail if panel.decay[1, a] <= DECAY else 0.01 * fl.tail  # see `hold`
+        goal = fl.tail if panel.decay[1, a] <= DECAY else DAMPED_TAIL * fl.tail  # see `hold`
         if 1.0 < fl.stops[panel.active[a], EXPONENT] < ROUND:
             goal *= SHARP_TAIL
         if is_rigid(fl, panel.active[a]):
             goal *= REST_TAIL
-        floor = 20.0 * noise[a] / deepest
+        floor = BLIND * noise[a] / deepest
         tail = max(goal * fl.tail / forced[a], floor)
         shake = 0.0  # of the force by rounding: terms of a bond cancel where it is at rest
         if is_bond(fl, panel.active[a]):
-            shake = 20.0 * noise[a] * largest(panel.slope, a)
+            shake = BLIND * noise[a] * largest(panel.slope, a)
         if o < na < slopes.shape[0]:
-            shake += 20.0 * noise[na + a] * largest(panel.slope, na + a)
+            shake += BLIND * noise[na + a] * largest(panel.slope, na + a)
         if o < na and legendre_tail(tab, panel.F, a) > tail * largest(panel.F, a) + shake:
             return False
         shake *= fl.stops[panel.active[a], EXPONENT] / deepest * largest(tab.slope, kind)
@@ -170,9 +178,9 @@ def response_tail(fl, tab, stop, back):
 
     Each mode counts by its share in the mobility.
     """
-    worst, mobility = 0.0, 1e-300
+    worst, mobility = 0.0, TINY
     for b in range(fl.blocks.shape[0]):
-        tail, size, share = 0.0, 1e-300, 0.0
+        tail, size, share = 0.0, TINY, 0.0
         for k in (2 * b, 2 * b + 1):
             row = abs(fl.rows[1, stop, k])
             tail = max(tail, row * legendre_tail(tab, back, k))
@@ -248,7 +256,7 @@ def minimum_beside(tab, values, places, heights):
         slope, curvature = parabola(left - here, right - here, below, here_value, above)
         if not curvature > 0.0:
             break
-        reach = 0.05 * (right - left)
+        reach = REACH * (right - left)
         here = min(max(here - 0.5 * slope / curvature, left), right)
         left, right = max(here - reach, places[0]), min(here + reach, places[2])
         here_value = interpolate(tab, values, here)
@@ -319,7 +327,7 @@ def first_doubt(tab, values, fine, rounding, error):
     Beside a switch at an end of the panel, where the value is rounding, it must have left that band
     before and leave it behind.
     """
-    if fine.min() > 0.1 * fine.max():  # not near zero between the places either
+    if fine.min() > CLEAR * fine.max():  # not near zero between the places either
         return 2.0
     last, where = fine.size - 1, 2.0
     came = fine[0] > 100.0 * rounding

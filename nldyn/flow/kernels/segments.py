@@ -46,11 +46,14 @@ from nldyn.flow.kernels.layout import (
     DECAY,
     FLIGHT,
     GAP,
+    HALF_ULP,
     INSTANT,
+    MAPPED,
     OK,
     RECORD_FULL,
     RELEASE,
     ROUNDED,
+    SUM_ROUNDING,
     TOO_MANY_PIECES,
     TOO_MANY_STEPS,
     WORST_ROUNDING,
@@ -68,6 +71,8 @@ from nldyn.flow.kernels.rigid import (
     settle,
     state_rate,
 )
+
+SHORTEST = 1e-10  # time apart, in rad of the excitation or the fastest mode: 1.6e-11 periods
 
 
 @inner
@@ -281,10 +286,9 @@ def run_pieces(
     fastest = fastest_moved(fl.blocks, fl.force)
     # lengths of panels that resolve the fastest mode: the maps spread the nodes at one end
     h_even = fl.node_angle * m / fastest if fastest > 0.0 else np.inf
-    h_mapped = 0.75 * h_even / tab.power
+    h_mapped = MAPPED * h_even / tab.power
     panel = new_panel(fl, m, w.size, np.empty(0, dtype=np.int64))
-    # 1.6e-11 periods of the excitation or of the fastest mode, but more than rounding of the time
-    shortest = max(1e-10 / max(fastest, fl.omega), 1e-15 * duration)
+    shortest = max(SHORTEST / max(fastest, fl.omega), SUM_ROUNDING * duration)
     t = 0.0
     start_switch = 0
     skips = np.zeros(n_stops)
@@ -389,7 +393,7 @@ def run_pieces(
                         rec.force[n, active[a], i] = panel.F[a, i]
                         rec.depth[n, active[a], i] = panel.output[a, i]
             for a in range(n_active):
-                if 1e-16 * panel.decay[1, a] > WORST_ROUNDING:
+                if HALF_ULP * panel.decay[1, a] > WORST_ROUNDING:
                     return ROUNDED
                 panel.decay[0, a] += panel.decay[1, a]
                 if panel.decay[1, a] > DECAY:
