@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.base.errors import SceneError
+from nldyn.base.errors import SceneError, must_be_symmetric
 from nldyn.scene.messages import KeyPath, joined, scene_error, show, unknown_name
 from nldyn.scene.schema import Matrix, Scene
 
@@ -381,7 +381,7 @@ def _check_symmetric(matrix: Matrix, count: int, key: KeyPath, report: Report) -
         raise report(key, f"must have {size}, like the mass matrix")
     values = np.array(matrix)
     if not np.allclose(values, values.T, rtol=1e-9, atol=1e-12 * np.abs(values).max()):
-        raise report(key, "must be symmetric")
+        raise report(key, must_be_symmetric(str(key[-1])))
 
 
 def _check_skew(matrix: Matrix, key: KeyPath, report: Report) -> None:

@@ -785,7 +785,9 @@ def shortened(
 def _contact_is_missing(box: Collector) -> bool:
     """Whether all stops are open at rest, and no orbit found touches one."""
     orbits = (orbit for branch in box.branches for orbit in branch.points)
-    return reach(box.flow.system) > 0.0 and all(orbit.max_penetration == 0.0 for orbit in orbits)
+    return reach(box.flow.system) > 0.0 and not any(
+        orbit.impacts or orbit.max_penetration > 0.0 for orbit in orbits
+    )
 
 
 def _follow_seed(box: Collector, seed: SubharmonicSeed, effort: OrbitSearchOptions) -> None:

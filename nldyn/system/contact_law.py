@@ -101,7 +101,10 @@ def check_law(owner: str, law: ContactLaw, stiffness: float, exponent: float) ->
                     )
     tiny = abs(_values(owner, law, 1e-9 * unit, 0.1)[0])
     if tiny > 1e-4 * max(abs(_values(owner, law, unit, 0.1)[0]), 1.0):
-        raise SystemModelError(f"{owner}: law must vanish with the penetration")
+        raise SystemModelError(
+            f"{owner}: law must vanish with the penetration; a spring with a damper beside it is "
+            "`dashpot` of a linear stop"
+        )
     _check_declared(owner, law, stiffness, exponent)
     _check_smooth(owner, law, unit)
 

@@ -15,7 +15,7 @@ import scipy.linalg as sla
 from numpy.typing import ArrayLike
 
 from nldyn.base.arrays import Complex, Real
-from nldyn.base.errors import SystemModelError, is_finite, numbers, shown
+from nldyn.base.errors import SystemModelError, is_finite, must_be_symmetric, numbers, shown
 from nldyn.system.linear import (
     ForcedResponse,
     LinearPart,
@@ -901,9 +901,7 @@ def _symmetric(name: str, values: ArrayLike) -> Real:
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
         raise SystemModelError(f"{name} must be a square matrix, got shape {matrix.shape}")
     if not np.allclose(matrix, matrix.T, rtol=1e-10, atol=1e-12 * float(np.abs(matrix).max())):
-        skew = {"stiffness": "circulatory", "damping": "gyroscopic"}.get(name)
-        hint = f"; a skew part, as of rotors, is given as {skew}" if skew else ""
-        raise SystemModelError(f"{name} must be symmetric{hint}")
+        raise SystemModelError(f"{name} {must_be_symmetric(name)}")
     return matrix
 
 

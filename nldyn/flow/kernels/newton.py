@@ -189,7 +189,8 @@ def newton(
         for i in range(unknowns - 1):
             opening += corrector.state_weight * sides[i, 0] ** 2
         opening = math.sqrt(opening)
-        noise = (NOISE + PRELOADED * preload) * np.abs(jacobians).max()
+        pressed = PRELOADED * preload * math.sqrt(rec.used[0])  # roundings of many pieces add up
+        noise = (NOISE + pressed) * np.abs(jacobians).max()
         sides[unknowns - 1, 0] = corrector.level
         for j in range(unknowns):
             matrix[unknowns - 1, j] = row[j]

@@ -227,7 +227,7 @@ def test_laws_that_cannot_be_used_are_refused():
 
     for law, words in (
         (wrong_slope, "derivative by the penetration"),
-        (dashpot, "vanish with the penetration"),
+        (dashpot, "vanish with the penetration; .* is `dashpot` of a linear stop"),
         (not_a_number, "not finite"),
         (lambda delta: delta, "three numbers"),
     ):

@@ -317,6 +317,19 @@ def test_system_without_excitation_rests_at_its_preload():
     assert orbit.max_abs_displacement == pytest.approx(abs(x[0]), rel=1e-9)
 
 
+def test_opposed_preloads_that_never_open_are_a_linear_spring():
+    """1/|K + 2k - ω² + icω|, beside preloads that make 1e-10 of it rounding, 225 times a period."""
+    stops = [Stop.linear("x", 1e6, gap=-1.0, direction=d) for d in (1, -1)]
+    system = System.from_matrices(
+        [[1.0]], [[1.0]], {"x": [1.0]}, damping=[[1.0]], stops=stops,
+        excitation=[HarmonicForce("x", 1.0)],
+    )  # fmt: skip
+    orbit = solve_orbit(system, 1.0, guess=np.zeros(2))
+    exact = 1.0 / abs(1.0 + 2e6 - orbit.omega**2 + 1j * orbit.omega)
+    assert orbit.max_abs_displacement == pytest.approx(exact, rel=1e-6)
+    assert abs(orbit.multipliers) == pytest.approx(math.exp(-0.5), rel=1e-8)
+
+
 def test_damper_and_both_sides_enter_the_orbit():
     """A symmetric pair of stops has a symmetric orbit: x(t + T/2) = -x(t)."""
     stops = [Stop("middle", 5e9, gap=2e-6), Stop("middle", 5e9, gap=2e-6, direction=-1)]

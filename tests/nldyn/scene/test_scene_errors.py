@@ -452,7 +452,7 @@ def test_matrices(tmp_path):
         ("[[1.0, 0.0]]", one, "matrices.mass must be square, but has 1 row and one of 2 numbers"),
         ("1.0", one, "matrices.mass must be a list in square brackets, not 1.0"),
         (one, "[[1.0]]", "matrices.stiffness must have 2 rows of 2 numbers"),
-        (one, "[[1.0, 0.5], [0.0, 1.0]]", "matrices.stiffness must be symmetric"),
+        (one, "[[1.0, 0.5], [0.0, 1.0]]", "matrices.stiffness must be symmetric; a skew part"),
         ("[[1.0]]", "[[1.0]]", "matrices.interfaces.a must have 1 number, one per"),
         ("[[1.0, 2.0], [2.0, 1.0]]", one, "matrices.mass must be positive definite"),
         (one, "[[1.0, 0.0], [0.0, -1.0]]", "matrices: the stiffness matrix is not positive"),

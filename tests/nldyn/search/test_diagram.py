@@ -18,6 +18,7 @@ from nldyn import (
     Diagram,
     FlowMap,
     HarmonicForce,
+    RigidStop,
     Stop,
     System,
     SystemModelError,
@@ -237,6 +238,11 @@ def test_stop_that_nothing_touches_is_told():
     assert note.startswith("no orbit that touches a stop was found")
     pressed = two_modes_before_a_gap(-1e-5)
     assert diagram(pressed, (90.0, 91.0), [1], search_points=1).notes == ()
+    rigid = System.from_matrices(
+        [[1.0]], [[1.0]], {"x": [1.0]}, damping=[[0.1]],
+        stops=[RigidStop("x", 0.8, gap=0.3)], excitation=[HarmonicForce("x", 1.0)],
+    )  # fmt: skip
+    assert diagram(rigid, (0.26, 0.28), [1], search_points=1).notes == ()
 
 
 def test_a_diagram_as_one_table(harmonic_branch):

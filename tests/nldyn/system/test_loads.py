@@ -17,7 +17,9 @@ from nldyn import (
     FlowMap,
     FlowOptions,
     HarmonicForce,
+    Orbit,
     Parameter,
+    RigidStop,
     Stop,
     System,
     SystemModelError,
@@ -328,34 +330,68 @@ def test_a_tube_lies_in_its_baffle_with_the_force_of_beam_theory():
     assert (number, force) == (1, pytest.approx(reaction, rel=1e-9))
 
 
-def test_a_stop_that_moves_is_three_loads():
-    """The documented system in the coordinates of the ground, where the stop moves, by scipy."""
-    M, C = np.diag([2.0, 1.0]), np.diag([1.0, 0.6])
-    K, r = np.array([[900.0, -400.0], [-400.0, 600.0]]), np.array([1.0, 0.0])
-    a, hz, gap, k = 2e-3, 3.2, 1e-3, 2e4
-    omega = 2 * np.pi * hz
-    system = System.from_matrices(
-        M, K, {"x1": [1.0, 0.0], "x2": [0.0, 1.0]}, damping=C,
-        stops=[Stop.linear("x1", k, gap=gap)],
-        loads={"M r": M @ r, "C r": C @ r, "K r": K @ r},
+M, C = np.diag([2.0, 1.0]), np.diag([1.0, 0.6])
+K, R = np.array([[900.0, -400.0], [-400.0, 600.0]]), np.array([1.0, 0.0])
+SHAKE, GAP = 2e-3, 1e-3
+
+
+def shaken(stop: Stop | RigidStop) -> System:
+    """The documented system, whose stop moves while its supports stand."""
+    return System.from_matrices(
+        M, K, {"x1": [1.0, 0.0], "x2": [0.0, 1.0]}, damping=C, stops=[stop],
+        loads={"M r": M @ R, "C r": C @ R, "K r": K @ R},
         excitation=[
-            BaseMotion("M r", a), BaseMotion("C r", a, "velocity"), HarmonicForce("K r", a, 180.0),
+            BaseMotion("M r", SHAKE), BaseMotion("C r", SHAKE, "velocity"),
+            HarmonicForce("K r", SHAKE, 180.0),
         ],
     ).with_absolute("x1", {"M r": 1.0})  # fmt: skip
-    orbit = solve_orbit(system, hz)
+
+
+def in_the_ground(orbit: Orbit, phase: float) -> np.ndarray:
+    """Displacements and velocities (4,) beside the ground, where the stop moves."""
+    state, turn = orbit.states(np.array([phase])), np.array([phase])
+    pairs = [orbit.system.displacement(n, state, turn, orbit.omega) for n in ("x1 absolute", "x2")]
+    return np.array(pairs)[:, :, 0].T.ravel()
+
+
+def test_a_stop_that_moves_is_three_loads():
+    """In the coordinates of the ground, by scipy."""
+    k, hz = 2e4, 3.2
+    orbit = solve_orbit(shaken(Stop.linear("x1", k, gap=GAP)), hz)
 
     def rates(t, x):
-        depth = x[0] - a * np.cos(omega * t) - gap
+        depth = x[0] - SHAKE * np.cos(orbit.omega * t) - GAP
         push = np.array([k * max(depth, 0.0), 0.0])
         return np.append(x[2:], np.linalg.solve(M, -C @ x[2:] - K @ x[:2] - push))
 
-    def at(phase: float) -> np.ndarray:
-        state, turn = orbit.states(np.array([phase])), np.array([phase])
-        pairs = [system.displacement(n, state, turn, omega) for n in ("x1 absolute", "x2")]
-        return np.array(pairs)[:, :, 0].T.ravel()
-
-    ways = [solve_ivp(rates, (0.0, t), at(0.0), rtol=1e-11, atol=1e-13, max_step=1e-3).y[:, -1]
-            for t in (0.4 / hz, 1.0 / hz)]  # fmt: skip
     assert orbit.max_penetration > 1e-4
-    for end, phase in zip(ways, (0.8 * np.pi, 0.0), strict=True):
-        assert end == pytest.approx(at(phase), abs=1e-8 * np.abs(end).max())
+    start = in_the_ground(orbit, 0.0)
+    for share, phase in ((0.4, 0.8 * np.pi), (1.0, 0.0)):
+        end = solve_ivp(rates, (0.0, share / hz), start, rtol=1e-11, atol=1e-13, max_step=1e-3)
+        expected = in_the_ground(orbit, phase)
+        assert end.y[:, -1] == pytest.approx(expected, abs=1e-8 * np.abs(start).max())
+
+
+def test_a_rigid_stop_that_moves_is_three_loads():
+    """In the coordinates of the ground: the mass leaves the stop e times as fast as it came."""
+    hz, e = 2.8, 0.6
+    orbit = solve_orbit(shaken(RigidStop("x1", e, gap=GAP)), hz)
+    omega = orbit.omega
+
+    def rates(t, x):
+        return np.append(x[2:], np.linalg.solve(M, -C @ x[2:] - K @ x[:2]))
+
+    def way(t, x):
+        return GAP + SHAKE * np.cos(omega * t) - x[0]
+
+    way.terminal, way.direction = True, -1
+    t, x, hits = 0.0, in_the_ground(orbit, 0.0), 0
+    while t < 1.0 / hz:
+        found = solve_ivp(rates, (t, 1.0 / hz), x, events=way, rtol=1e-11, atol=1e-13)
+        t, x = found.t[-1], found.y[:, -1]
+        if found.status == 1:
+            stop = -omega * SHAKE * np.sin(omega * t)
+            x[2] = stop - e * (x[2] - stop)
+            hits += 1
+    assert hits == orbit.impacts == 1
+    assert x == pytest.approx(in_the_ground(orbit, 0.0), abs=1e-8 * np.abs(x).max())
