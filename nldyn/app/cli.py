@@ -590,6 +590,92 @@ def backbone(
     click.echo(f"written to {out}: {written_by(out, 'backbone')}")
 
 
+@main.command()
+@scene_argument
+@out_option
+@mesh_option
+@replace_option
+@click.option(
+    "--frequency-hz",
+    type=click.FloatRange(1e-6, 1e12),
+    required=True,
+    metavar="HZ",
+    help="Excitation frequency, at which a run-up begins.",
+)
+@click.option(
+    "--periods",
+    type=click.IntRange(1, 100_000),
+    metavar="N",
+    help="Excitation periods to record; 100 unless given.",
+)
+@click.option(
+    "--transient",
+    type=click.IntRange(0, 100_000_000),
+    default=0,
+    show_default=True,
+    metavar="N",
+    help="Excitation periods from rest before the recording, or before the run-up.",
+)
+@click.option(
+    "--to-hz",
+    type=click.FloatRange(1e-6, 1e12),
+    metavar="HZ",
+    help="Run up or down to this frequency, instead of staying.",
+)
+@click.option(
+    "--rate-hz-per-s",
+    type=click.FloatRange(0.0, min_open=True),
+    metavar="R",
+    help="How fast it runs.",
+)
+@click.option(
+    "--lyapunov", "exponents", is_flag=True, help="Tell the largest Lyapunov exponent, too."
+)
+@quiet_option
+def simulate(
+    scene: Path,
+    out: Path,
+    mesh_folders: tuple[Path, ...],
+    replace: bool,
+    frequency_hz: float,
+    periods: int | None,
+    transient: int,
+    to_hz: float | None,
+    rate_hz_per_s: float | None,
+    exponents: bool,
+    quiet: bool,
+) -> None:
+    """Simulate a scene in time from rest, at one frequency or in a run-up or run-down.
+
+    Writes motion.csv, the displacements and contact forces, impacts.csv, and a picture; of a
+    run-up also peaks.csv. Forces may have frequencies of their own.
+    """
+    if (to_hz is None) != (rate_hz_per_s is None):
+        raise click.UsageError("'--to-hz' and '--rate-hz-per-s' go together")
+    if to_hz is not None and (periods is not None or exponents):
+        raise click.UsageError("'--periods' and '--lyapunov' are for one frequency, not '--to-hz'")
+    with plain_errors():
+        from nldyn.runtime.progress import progress_line
+        from nldyn.scene.read import load_scene
+
+        loaded = load_scene(scene, mesh_folders)
+        check_results(out, loaded, replace)
+        from nldyn.longterm.impacts import impacts
+        from nldyn.report.simulation import write_simulation
+        from nldyn.scene.simulation import simulation_of
+
+        with progress_line(quiet):
+            found = simulation_of(
+                loaded, frequency_hz, periods=periods or 100, transient=transient,
+                exponents=exponents, to_hz=to_hz, rate_hz_per_s=rate_hz_per_s or 0.0,
+            )  # fmt: skip
+        write_simulation(found.motion, out, loaded.text, loaded.title)
+    for told in (found.motion, impacts(found.motion), found.spectrum):
+        if told is not None:
+            click.echo(repr(told).strip("<>"))
+    click.echo(f"written to {out}: {written_by(out, 'simulation')}")
+
+
 def written_by(out: Path, kind: str) -> str:
     """The files that a command wrote into a directory of results."""
     from nldyn.runtime.result_directory import written_files

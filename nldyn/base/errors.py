@@ -138,6 +138,7 @@ class ConvergenceError(RuntimeError):
 class LocateError(RuntimeError):
     """An orbit between two points of a branch could not be corrected."""
 
+
 def must_be_symmetric(name: str) -> str:
     """What is said of a matrix that is not, and where its skew part belongs."""
     skew = {"stiffness": "circulatory", "damping": "gyroscopic"}.get(name)

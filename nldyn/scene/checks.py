@@ -129,9 +129,9 @@ def check_computable(scene: Scene, file: Path) -> None:
         raise scene_error(file, ("excitation",), f"{fault}: nothing moves the structure")
     for number, table in enumerate(scene.excitation):
         if table.frequency_hz is not None:
-            fault = "leaves no motion a period, so that no branch can be followed: simulate the "
-            wanted = "build_system(load_scene(...)) in Python, or let both be multiples 'harmonic' "
-            rest = "of a lower frequency, nearly (5 and 7 for a ratio of 1.4)"
+            fault = "leaves no motion a period, so that no branch can be followed: simulate it by "
+            wanted = "'nldyn simulate', or let both be multiples 'harmonic' of a lower frequency, "
+            rest = "nearly (5 and 7 for a ratio of 1.4)"
             raise scene_error(file, ("excitation", number, "frequency_hz"), fault + wanted + rest)
     if scene.continuation is None:
         fault = "is missing: give the frequency range, range_hz = [lowest, highest]"

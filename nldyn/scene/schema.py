@@ -700,7 +700,7 @@ class ExcitationTable(Table):
     act, the frequency is that of the whole cycle."""
     frequency_hz: Frequency | None = None
     """[Hz] A frequency of its own of a harmonic force, instead of `harmonic`: the scene is then for
-    [simulations](../how-to/simulation.md#two-frequencies) in Python, as no motion has a period."""
+    [`nldyn simulate`](../how-to/simulation.md#two-frequencies), as no motion has a period."""
     file: str | None = None
     """Samples at 0, T/n, ..., (n − 1) T/n, beside the scene; `#` begins a remark. What the
     harmonics leave out is told."""

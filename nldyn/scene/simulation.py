@@ -1,0 +1,83 @@
+"""Simulations of a scene: at one frequency, and run-ups and run-downs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nldyn.base.errors import SystemModelError
+from nldyn.longterm.lyapunov import LyapunovSpectrum, lyapunov_exponents
+from nldyn.longterm.simulation import Motion, simulate, sweep
+from nldyn.scene.build import build_system
+from nldyn.scene.faults import told_as
+from nldyn.scene.schema import Scene
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What `simulation_of` simulated.
+
+    Parameters
+    ----------
+    motion : Motion
+        The recorded motion.
+    spectrum : LyapunovSpectrum or None
+        Its Lyapunov exponents, if they were wanted.
+    """
+
+    motion: Motion
+    spectrum: LyapunovSpectrum | None = None
+
+
+def simulation_of(
+    scene: Scene,
+    frequency_hz: float,
+    *,
+    periods: int = 100,
+    transient: int = 0,
+    exponents: bool = False,
+    to_hz: float | None = None,
+    rate_hz_per_s: float = 0.0,
+) -> Simulation:
+    """Simulate a scene from rest, at one frequency or through a range.
+
+    Parameters
+    ----------
+    scene : Scene
+        It needs no continuation, and its forces may have frequencies of their own.
+    frequency_hz : float
+        Excitation frequency in Hz, at which a run-up or run-down begins.
+    periods : int
+        Excitation periods to record at this frequency.
+    transient : int
+        Periods before the recording, or before the run-up.
+    exponents : bool
+        Whether to compute the Lyapunov exponents at this frequency, too.
+    to_hz : float, optional
+        Frequency in Hz at which a run-up or run-down ends, in place of `periods`.
+    rate_hz_per_s : float
+        Its rate in Hz/s, positive either way.
+
+    Raises
+    ------
+    SceneError
+        As `build_system`, and for what `simulate` and `sweep` refuse.
+    ConvergenceError
+        As `simulate`.
+
+    Examples
+    --------
+    >>> from nldyn.base.resources import example
+    >>> from nldyn.scene.read import load_scene
+    >>> simulation_of(load_scene(example("one_dof.toml")), 20.0, periods=200).motion
+    <Motion of 10 s>
+    """
+    system = build_system(scene)
+    with told_as(scene, (), SystemModelError):
+        if to_hz is None:
+            motion = simulate(system, frequency_hz, periods, transient=transient)
+        else:
+            start = simulate(system, frequency_hz, transient).end if transient else None
+            motion = sweep(system, (frequency_hz, to_hz), rate_hz_per_s, start=start)
+        if not exponents:
+            return Simulation(motion)
+        return Simulation(motion, lyapunov_exponents(system, frequency_hz))

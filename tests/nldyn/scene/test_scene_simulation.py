@@ -1,0 +1,92 @@
+"""Simulations of scenes, against the closed form of a linear oscillator that begins at rest."""
+
+import csv
+import math
+import re
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from nldyn.app.cli import main
+
+SCENE = """
+[matrices]
+mass = [[1.0]]
+stiffness = [[1.0]]
+interfaces.x = [1.0]
+[[stops]]
+at = "x"
+law = "linear"
+stiffness = 3.0
+gap = 10.0
+[[excitation]]
+at = "x"
+kind = "harmonic"
+amplitude = 1.0
+[[excitation]]
+at = "x"
+kind = "harmonic"
+amplitude = 0.5
+frequency_hz = 0.11
+"""
+
+
+def told(folder, text, *more):
+    scene = folder / "scene.toml"
+    scene.write_text(text)
+    return CliRunner().invoke(main, ["simulate", str(scene), "--out", str(folder / "out"), *more])
+
+
+def columns(file):
+    with file.open() as open_file:
+        rows = list(csv.DictReader(open_file))
+    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+def test_two_frequencies_beat_as_the_closed_form_says(tmp_path):
+    """Σ F (cos νt - cos t)/(1 - ν²) without damping."""
+    result = told(tmp_path, SCENE, "--frequency-hz", "0.3", "--periods", "20")
+    assert result.exit_code == 0, result.stderr
+    assert "Motion of 66.6667 s" in result.stdout and "Impacts: none" in result.stdout
+    found = columns(tmp_path / "out" / "motion.csv")
+    t, exact = found["time_s"], 0.0
+    for force, hz in ((1.0, 0.3), (0.5, 0.11)):
+        rate = 2 * np.pi * hz
+        exact = exact + force * (np.cos(rate * t) - np.cos(t)) / (1 - rate**2)
+    assert t.size > 1000
+    assert found["displacement_m[x]"] == pytest.approx(exact, abs=1e-9 * np.abs(exact).max())
+    assert (tmp_path / "out" / "simulation.png").stat().st_size > 1000
+
+
+def test_lyapunov_exponent_and_run_up(tmp_path):
+    """Both exponents are -c/2; slowly run up, the peak in a period is that of the steady motion."""
+    text = SCENE.partition('[[excitation]]\nat = "x"\nkind = "harmonic"\namplitude = 0.5')[0]
+    text = text.replace("interfaces", "damping = [[1.0]]\ninterfaces")
+    result = told(tmp_path, text, "--frequency-hz", "0.3", "--periods", "1", "--lyapunov")
+    assert result.exit_code == 0, result.stderr
+    said = re.search(r"largest (\S+) \+- (\S+) 1/s", result.stdout)
+    assert float(said[1]) == pytest.approx(-0.5, rel=1e-3)
+    way = ("--to-hz", "0.2", "--rate-hz-per-s", "1e-4", "--transient", "50", "--replace")
+    result = told(tmp_path, text, "--frequency-hz", "0.3", *way)
+    assert result.exit_code == 0, result.stderr
+    found = columns(tmp_path / "out" / "peaks.csv")
+    rate = 2 * math.pi * found["frequency_hz"]
+    steady = 1.0 / np.abs(1.0 - rate**2 + 1j * rate)
+    assert found["max_abs_displacement_m"] == pytest.approx(steady, rel=2e-3)
+    assert rate[0] > 2 * math.pi * 0.299 and rate[-1] < 2 * math.pi * 0.201
+
+
+@pytest.mark.parametrize(
+    ("more", "fault"),
+    [
+        (("--to-hz", "2.0"), "'--to-hz' and '--rate-hz-per-s' go together"),
+        (("--rate-hz-per-s", "2.0"), "'--to-hz' and '--rate-hz-per-s' go together"),
+        (("--to-hz", "2.0", "--rate-hz-per-s", "1.0", "--periods", "9"), "are for one frequency"),
+        (("--to-hz", "1.0", "--rate-hz-per-s", "1.0"), "scene.toml: "),
+    ],
+)
+def test_what_makes_no_sense_is_told(tmp_path, more, fault):
+    result = told(tmp_path, SCENE, "--frequency-hz", "1.0", *more)
+    assert result.exit_code == 2 and fault in result.stderr
+    assert not (tmp_path / "out").exists()
