@@ -19,6 +19,9 @@ from cms.reduction.model import ReducedModel, positive
 from cms.reduction.residual import residual_flexibility, without_modes
 from cms.solvers.eigen import Modes, lowest_modes, shifted_factor, without_offsets
 
+NO_MODE = 1e8  # relative residual of what is no mode at all; its square is still a number
+NEGATIVE = 1e-9  # of the largest: an eigenvalue that is not rounding
+
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
@@ -66,7 +69,7 @@ class Accuracy:
         Kept free-interface modes have bands at rounding level; a residual mode's band says how
         little it is a mode.
         """
-        half = np.minimum(self.reduced.residuals, 1e8) / 2.0
+        half = np.minimum(self.reduced.residuals, NO_MODE) / 2.0
         factor = np.sqrt(1.0 + half**2) + half
         hz = self.reduced.frequencies_hz
         return np.column_stack([hz / factor, hz * factor])
@@ -136,7 +139,7 @@ class Accuracy:
             growth = 1.0 / (1.0 - (hz / self.next_hz) ** 2)
             low, high = self._error(square, 1.0), self._error(square, growth)
             spread = high - low
-            if np.min(np.linalg.eigvalsh(spread)) < -1e-9 * np.abs(high).max():
+            if np.min(np.linalg.eigvalsh(spread)) < -NEGATIVE * np.abs(high).max():
                 bands.append((-np.inf, np.inf))  # a resonance of the model lies in between
             elif i == j:
                 bands.append((low[i, i], high[i, i]))

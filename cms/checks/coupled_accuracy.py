@@ -17,6 +17,7 @@ from cms.reduction.coupling import Joint, check_joints, couple, side_by_side
 FIRST_STEP = 1e-9  # no band is narrower, because of rounding
 GROWTH = 4.0
 BISECTIONS = 12
+DEPENDENT = 1e-9  # singular value of unit conditions that depend on each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +230,7 @@ def coupled_accuracy(
     rigid = assembly.joint_rows([joint for joint in acting if joint.stiffness is None])
     motions = rigid @ np.hstack([assembly.rows, assembly.flexibility])
     lengths = np.linalg.norm(motions, axis=1, keepdims=True)
-    if not np.all(lengths) or np.linalg.matrix_rank(motions / lengths, tol=1e-9) < len(rigid):
+    if not np.all(lengths) or np.linalg.matrix_rank(motions / lengths, tol=DEPENDENT) < len(rigid):
         raise ReductionError(
             "the error of a coupled model is known only where no rigid joint follows from others"
         )

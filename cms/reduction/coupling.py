@@ -20,6 +20,10 @@ RIGID_JOINT = 1e-12
 RIGID_RANK = 1e-9
 RIGID_GAP = 1e-5  # frequency of a rigid-body mode that is rounding, beside the first elastic one
 COUPLED_ERROR = 1e-8
+TINY = 1e-300  # in place of a divisor that is zero
+DEPENDENT = 1e-10  # least over largest singular value of conditions that depend on each other
+ROUNDED = 1e-12  # of the parts' flexibility: what coupling leaves of it is rounding
+OTHER = 1e-6  # part of a shape that the ones before it do not hold: it is another one
 
 
 @dataclass(frozen=True)
@@ -243,7 +247,7 @@ def check_coupled(
             "too much"
         )
     mass = np.abs(vectors.T @ vectors - np.eye(omega.size)).max()
-    energy = np.abs(stretch.T @ stretch - np.diag(omega**2)).max() / max(omega[-1] ** 2, 1e-300)
+    energy = np.abs(stretch.T @ stretch - np.diag(omega**2)).max() / max(omega[-1] ** 2, TINY)
     size = np.linalg.norm(closed, axis=1)[:, None] * np.linalg.norm(vectors, axis=0)
     gap = np.max(np.abs(closed @ vectors) / np.where(size > 0.0, size, 1.0), initial=0.0)
     for what, error in (("mass", mass), ("energy", energy), ("displacement at a joint", gap)):
@@ -328,7 +332,7 @@ def beside(answer: FloatArray, others: FloatArray, squares: FloatArray) -> Float
         before = stiff * np.column_stack([answer, *found])
         energy = stiff[:, 0] * shape
         left = energy - before @ np.linalg.lstsq(before, energy, rcond=None)[0]
-        if np.linalg.norm(left) > 1e-6 * np.linalg.norm(energy):
+        if np.linalg.norm(left) > OTHER * np.linalg.norm(energy):
             found.append(shape / np.linalg.norm(energy))
     return np.column_stack(found) if found else np.zeros((squares.size, 0))
 
@@ -393,7 +397,7 @@ def null_space(conditions: FloatArray, size: int) -> FloatArray:
     conditions = conditions[length > 0.0] / length[length > 0.0, None]
     if conditions.shape[0] == 0:
         return np.eye(size)
-    return np.asarray(linalg.null_space(conditions, rcond=1e-10))
+    return np.asarray(linalg.null_space(conditions, rcond=DEPENDENT))
 
 
 def damper_matrix(assembly: Assembly, joints: Sequence[Joint]) -> FloatArray:
@@ -430,7 +434,7 @@ def model_of(
     flexibility = (flexibility + flexibility.T) / 2
     before = np.sqrt(np.diag(assembly.flexibility))
     if np.any(before):
-        flexibility[np.abs(flexibility) <= 1e-12 * np.outer(before, before)] = 0.0
+        flexibility[np.abs(flexibility) <= ROUNDED * np.outer(before, before)] = 0.0
     massless = bool(np.any(flexibility))
     return ReducedModel(
         frequencies_hz=omega / (2.0 * np.pi),

@@ -51,6 +51,7 @@ METHODS = (
 FIXED = ("craig-bampton", "guyan")
 NEGLIGIBLE_PARTICIPATION = 1e-9
 MASS_ERROR = 1e-7
+LARGEST = 1e-6  # relative difference of entries that both count as a mode's largest
 
 
 def reduce(
@@ -441,7 +442,7 @@ def signed(vectors: FloatArray, loads: FloatArray) -> FloatArray:
     rows = loads.T @ vectors
     size = np.linalg.norm(loads, axis=0)[:, None] * np.linalg.norm(vectors, axis=0)
     peak = np.max(np.abs(vectors), axis=0)
-    largest = np.argmax(np.abs(vectors) > (1.0 - 1e-6) * peak, axis=0)
+    largest = np.argmax(np.abs(vectors) > (1.0 - LARGEST) * peak, axis=0)
     signs = np.sign(np.take_along_axis(vectors, largest[None, :], axis=0)[0])
     for row, scale in zip(rows[::-1], size[::-1], strict=True):
         signs = np.where(np.abs(row) > NEGLIGIBLE_PARTICIPATION * scale, np.sign(row), signs)

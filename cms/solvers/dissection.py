@@ -17,6 +17,8 @@ LANDMARKS = 20
 SMOOTHINGS = 40
 CUTS = (0.5, 0.47, 0.53)  # shares of a part on one side of the cuts that are tried
 LONG = 0.6  # axes along which a part is this long, relative to its longest, are tried
+FLAT = 1e-12  # of the largest variance: a graph without an extent that way
+TINY = 1e-300  # in place of a divisor that is zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +182,7 @@ def landmark_coordinates(graph: SparseMatrix) -> FloatArray:
     mean = between.mean(axis=0)
     values, vectors = np.linalg.eigh(-0.5 * (between - mean - mean[:, None] + mean.mean()))
     values, vectors = values[::-1][:3], vectors[:, ::-1][:, :3]
-    scale = np.sqrt(np.maximum(values, 1e-12 * max(values[0], 1e-300)))
+    scale = np.sqrt(np.maximum(values, FLAT * max(values[0], TINY)))
     return smoothed(graph, -0.5 * (np.array(squares).T - mean) @ (vectors / scale))
 
 

@@ -30,6 +30,9 @@ REFINED = 1e-12  # bound of the error of w^2, which after a step is about its sq
 DENSE_AT_MOST = 6000
 LOOK_ALWAYS = 200  # up to this many vectors it costs little to see after each block what converged
 LOOK_AGAIN = 1.15  # beyond, after the basis has grown by so much
+MASSLESS = 1e-12  # of the largest 1/(ω² + shift): a direction without mass
+CONVERGED = 1e-12  # relative residual of an eigenvalue that is found
+EXACT = 1e-6  # of the largest 1/(ω² + shift): all above it are found to enough digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,10 +278,10 @@ def dense_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatArra
     nu, vectors = linalg.eigh(mass, matrix, subset_by_index=[size - count, size - 1])
     nu, vectors = nu[::-1], vectors[:, ::-1]
     positive = nu > size * EPS * nu[0]
-    if np.all(positive) and nu[-1] > 1e-6 * nu[0]:
+    if np.all(positive) and nu[-1] > EXACT * nu[0]:
         return 1.0 / nu - shifted.shift, vectors / np.sqrt(nu)
     if factorise(pencil.mass) is None:
-        massive = nu > 1e-12 * nu[0]
+        massive = nu > MASSLESS * nu[0]
         if not np.all(massive):
             raise ReductionError(
                 f"{count} modes are asked for, but only {np.count_nonzero(massive)} have mass"
@@ -379,7 +382,7 @@ def lanczos_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatAr
             nu, turn = linalg.eigh(projected)
             nu, turn = nu[::-1][:wanted], turn[:, ::-1][:, :wanted]
             left = np.linalg.norm(outside @ turn[-outside.shape[1] :], axis=0)
-            converged = left <= np.maximum(1e-12 * nu, 10 * EPS * nu[0])
+            converged = left <= np.maximum(CONVERGED * nu, 10 * EPS * nu[0])
             if fresh.shape[1] == 0 or (nu.size == wanted and np.all(converged)):
                 break
         if used + fresh.shape[1] > room.shape[1]:

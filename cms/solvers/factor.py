@@ -33,6 +33,7 @@ SUPERLU_BYTES = 40.0  # memory per such entry, with the copy from which the pivo
 SUSPECT_PIVOT = 1e-11  # of a matrix scaled to a unit diagonal: what rounding leaves of none
 SUSPECT_EIGENVALUE = 1e-13  # the same of an eigenvalue, which is smaller than every pivot
 DENSE_SUSPECT = 1e-12  # where the pivots are those of LAPACK, an eigenvalue costs little
+KILOBYTE, DOUBLE = 1024.0, 8.0  # in bytes
 
 Solver = Callable[[FloatArray], FloatArray]
 
@@ -205,7 +206,7 @@ def available_memory() -> float:
     except OSError:
         return math.inf
     kilobytes = [line.split()[1] for line in lines if line.startswith("MemAvailable:")]
-    return 1024.0 * float(kilobytes[0]) if kilobytes else math.inf
+    return KILOBYTE * float(kilobytes[0]) if kilobytes else math.inf
 
 
 def dense_solver(matrix: SparseMatrix, suspect: float) -> tuple[Solver, bool] | None:
@@ -228,7 +229,7 @@ def dense_solver(matrix: SparseMatrix, suspect: float) -> tuple[Solver, bool] | 
 def cholesky_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
     """Solver by fronts, and whether the matrix may be singular, or None if it is not positive."""
     plan = announced_plan(matrix)
-    with factorising(matrix, "sparse Cholesky", 8.0 * plan.most_numbers):
+    with factorising(matrix, "sparse Cholesky", DOUBLE * plan.most_numbers):
         try:
             factor = Cholesky(matrix, plan)
         except NotPositiveDefiniteError:
@@ -318,7 +319,7 @@ def pardiso_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
     try:
         pardiso.set_phase(11)
         pardiso._call_pardiso(upper, nothing)
-        needed = 1024.0 * max(pardiso.iparm[14], float(pardiso.iparm[15]) + pardiso.iparm[16])
+        needed = KILOBYTE * max(pardiso.iparm[14], float(pardiso.iparm[15]) + pardiso.iparm[16])
         with factorising(matrix, "PARDISO", needed):
             pardiso.set_phase(22)
             pardiso._call_pardiso(upper, nothing)

@@ -18,6 +18,11 @@ from fem.mesh.cells import KINDS, measures
 from fem.model.structure import AXES, IN_PLANE, StructureModel, axis_index
 from fem.model.supports import Support
 
+CANCELLED = 1e-12  # of the largest: a coefficient that is rounding
+ALIGNED = 1e10  # condition of a support's moments of area, from which its nodes lie on a line
+FREE = 1e-6  # of the mesh: a motion against which supports have no more arm than so is free
+
+
 BoolArray = npt.NDArray[np.bool_]
 
 
@@ -222,7 +227,7 @@ def solved_equations(
             given[dof] = given.get(dof, 0.0) + coefficient
         size = max(map(abs, given.values()))
         form = _put_in(given, solved, owner, coupled_rows)
-        form = {d: c for d, c in form.items() if not held[d] and abs(c) > 1e-12 * size}
+        form = {d: c for d, c in form.items() if not held[d] and abs(c) > CANCELLED * size}
         if form:
             first = next(iter(given))
             pivot = first if first in form else max(form, key=lambda dof: abs(form[dof]))
@@ -321,7 +326,7 @@ def _check_turns(model: StructureModel, support: Support, nodes: IntArray, dofs:
     shift = np.broadcast_to(np.eye(3), (len(nodes), 3, 3))
     motions = np.concatenate([shift, -cross_matrix(place)], axis=2)
     held = motions[:, [c for c in columns if c < 3]].reshape(-1, 6)
-    prevented = np.diag(np.linalg.pinv(held, rcond=1e-6) @ held) > 1.0 - 1e-6
+    prevented = np.diag(np.linalg.pinv(held, rcond=FREE) @ held) > 1.0 - FREE
     for column in lacking:
         if not prevented[column]:
             raise ModelError(
@@ -390,7 +395,7 @@ def averaging(
     WR = (products @ R.reshape(len(nodes), -1)).reshape(R.shape)
     normal = np.einsum("mij,mik->jk", R, WR)
     scale = np.sqrt(np.diag(normal))
-    if not (scale > 0.0).all() or np.linalg.cond(normal / np.outer(scale, scale)) > 1e10:
+    if not (scale > 0.0).all() or np.linalg.cond(normal / np.outer(scale, scale)) > ALIGNED:
         raise ModelError(
             f"{what}: the nodes of the face lie on a line or a point, so that their mean rotation"
             " is not determined"

@@ -17,6 +17,7 @@ GREATEST_ASPECT = 30.0
 GREATEST_WARP = 45.0
 """Angle in degrees between the halves of a face with four corners, above which it is told of."""
 BATCH = 20_000
+TINY = 1e-300  # in place of a divisor that is zero
 
 
 def distortion_warnings(model: StructureModel) -> Iterator[str]:
@@ -95,5 +96,5 @@ def warps(cell: CellKind, coordinates: FloatArray) -> FloatArray:
 def _angle(one: FloatArray, other: FloatArray) -> FloatArray:
     normals = [np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]) for t in (one, other)]
     length = np.linalg.norm(normals[0], axis=1) * np.linalg.norm(normals[1], axis=1)
-    cosine = np.sum(normals[0] * normals[1], axis=1) / np.maximum(length, 1e-300)
+    cosine = np.sum(normals[0] * normals[1], axis=1) / np.maximum(length, TINY)
     return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))), dtype=np.float64)

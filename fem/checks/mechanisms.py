@@ -18,6 +18,7 @@ from fem.mesh.pieces import place_of
 from fem.model.structure import AXES, StructureModel, axis_index
 
 MEANT = ", or say that it is meant ('pinned')"
+ALIGNED = 1e-6  # of the mesh: nodes no farther than so from a line lie on it
 
 
 def joint_warnings(model: StructureModel) -> Iterator[str]:
@@ -190,7 +191,7 @@ def _on_axes(model: StructureModel, pairs: IntArray) -> IntArray:
     found: set[int] = set()
     for nodes in shared.values():
         spans = model.mesh.points[nodes] - model.mesh.points[nodes[0]]
-        rank = np.linalg.matrix_rank(spans, tol=1e-6 * model.mesh.size)
+        rank = np.linalg.matrix_rank(spans, tol=ALIGNED * model.mesh.size)
         if rank < (1 if model.is_plane else 2):
             found.update(nodes)
     return np.array(sorted(found), dtype=np.int64)

@@ -17,6 +17,8 @@ from fem.model.parts import BeamPart
 from fem.model.structure import StructureModel
 
 THICK = 0.5
+DIRECTIONS = 1e5  # steps of a component, within one of which two directions are the same
+FLAT = 1e-9  # of the largest: area of a facet that has none
 """Thickness of a shell over the side of a square of its area."""
 
 
@@ -100,9 +102,9 @@ def _upon_each_other(model: FrameModel | StructureModel) -> Iterator[tuple[int, 
 def _alike(nodes: IntArray, directions: FloatArray) -> tuple[int, int]:
     """How many rows have the nodes and, to 1e-5, the direction of an earlier one; a node of one."""
     length = np.linalg.norm(directions, axis=1)
-    some = length > 1e-9 * np.max(length, initial=0.0)  # flat facets are refused elsewhere
+    some = length > FLAT * np.max(length, initial=0.0)  # flat facets are refused elsewhere
     nodes, unit = nodes[some], directions[some] / length[some, None]
-    keys = np.column_stack([nodes, np.rint(1e5 * unit).astype(np.int64)])
+    keys = np.column_stack([nodes, np.rint(DIRECTIONS * unit).astype(np.int64)])
     _, first = np.unique(keys, axis=0, return_index=True)
     again = np.setdiff1d(np.arange(len(keys)), first)
     return len(again), int(nodes[again[0], 0]) if len(again) else -1

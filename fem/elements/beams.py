@@ -29,6 +29,7 @@ UPRIGHT = np.array([0, 0, 1.0])
 IN_PLANE = np.array([1, 5, 7, 11])
 OUT_OF_PLANE = np.array([2, 4, 8, 10])
 TURNED_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
+ALONG = 1e-6  # sine of the angle between two directions that are one
 """A positive rotation about the local y lowers w along x."""
 
 
@@ -230,13 +231,13 @@ def local_axes(part: BeamPart, spans: FloatArray, what: str) -> FloatArray:
         section = part.section.taper if isinstance(part.section, SectionRun) else part.section
         section = section.start if isinstance(section, TaperedSection) else section
         if isinstance(section, CircularSection) and not any(part.offset):
-            z[np.linalg.norm(z, axis=1) < 1e-6] = (1.0, 0.0, 0.0)  # round: any direction will do
+            z[np.linalg.norm(z, axis=1) < ALONG] = (1.0, 0.0, 0.0)  # round: any direction will do
         fault = "runs along z, so it needs an orientation (the direction of the section's height)"
     else:
         z = np.cross(x, np.asarray(part.orientation) / np.linalg.norm(part.orientation))
         fault = f"runs along its orientation {part.orientation}"
     size = np.linalg.norm(z, axis=1)
-    along = np.flatnonzero(size < 1e-6)
+    along = np.flatnonzero(size < ALONG)
     if len(along):
         raise ModelError(f"{what}: line {along[0]} {fault}")
     z = z / size[:, None]

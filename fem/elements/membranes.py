@@ -18,6 +18,7 @@ LIFT = 1.5
 COEFFICIENTS = (1.0, 2.0, 1.0, 0.0, 1.0, -1.0, -1.0, -1.0, -2.0)
 """Felippa's beta_1 to beta_9."""
 CORNERS = ((0, 1, 2, 3, 4, 5, 6, 7, 8), (8, 6, 7, 2, 0, 1, 5, 3, 4), (4, 5, 3, 7, 8, 6, 1, 2, 0))
+LEAST_WEIGHT = 0.01  # of the higher strains, which vanish at a Poisson's ratio of 1/2
 """Which of the coefficients relate strains along the edges at a corner to the rotations."""
 
 
@@ -113,7 +114,7 @@ def rotation_stiffness(
 ) -> FloatArray:
     """Stiffness (e, 3, 3) against the corners' rotations less that of the triangle."""
     natural = split_strains(from_edges(corners))
-    weight = max((1.0 - 4.0 * poissons_ratio**2) / 2.0, 0.01)
+    weight = max((1.0 - 4.0 * poissons_ratio**2) / 2.0, LEAST_WEIGHT)
     sides = corners[:, [1, 2, 0]] - corners[:, [0, 1, 2]]
     scale = (2.0 * area[:, None] / 3.0) / np.sum(sides**2, axis=2)
     beta = np.array(COEFFICIENTS)

@@ -27,6 +27,7 @@ ORDERS = {"triangle": 4, "quad": 2}
 SMOOTH_DEGREES = 30.0
 """Facets that meet at less than this angle are taken for one smooth surface."""
 BATCH_BYTES = 1e8
+FLAT = 1e-9  # of its squared diameter: area of a facet that has none
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +74,7 @@ def check_shape(kind: CellKind, cells: FlatCells, nodes: IntArray, what: str) ->
     """Raise ModelError for a facet without area, or with a corner that points inwards."""
     area = np.linalg.det(jacobians(kind, cells.plane, kind.corners))
     size = np.linalg.norm(np.ptp(cells.plane, axis=1), axis=1) ** 2
-    bad = np.flatnonzero(~(area > 1e-9 * size[:, None]).all(axis=1))
+    bad = np.flatnonzero(~(area > FLAT * size[:, None]).all(axis=1))
     if len(bad):
         listed = ", ".join(str(node) for node in nodes[bad[0]])
         raise ModelError(

@@ -13,6 +13,9 @@ from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.structure_mesh import StructureMesh
 from fem.model.parts import TrussPart
 
+TURNS_BACK = 1e-9  # of its squared length: how far a bar's curve goes ahead at its ends, at least
+UNHELD = 1e-9  # of a bar's own hold: a direction in which a node has none
+
 
 def truss_rows(
     part: TrussPart, kind: CellKind, coordinates: FloatArray, what: str
@@ -50,7 +53,7 @@ def _along(
     _, ends = kind.basis(kind.corners)
     forward = np.einsum("ebi,qb,ei->eq", coordinates, ends[..., 0], chord)
     size = np.abs(coordinates - coordinates[:, :1]).max(axis=(1, 2))
-    bad = np.flatnonzero(~(forward > 1e-9 * size[:, None] ** 2).all(axis=1))
+    bad = np.flatnonzero(~(forward > TURNS_BACK * size[:, None] ** 2).all(axis=1))
     if len(bad):
         raise ModelError(f"{what}: line {bad[0]} has no length or doubles back on itself")
     run = np.einsum("ebi,qb->eqi", coordinates, slopes[..., 0])
@@ -111,7 +114,7 @@ def loose_nodes(
     least = np.linalg.eigvalsh(reach[:, :dimension, :dimension])[:, 0]
     used = np.zeros(len(points), dtype=np.bool_)
     used[pairs] = True
-    return np.flatnonzero(used & (least < 1e-9))
+    return np.flatnonzero(used & (least < UNHELD))
 
 
 def chords(cells: IntArray) -> IntArray:

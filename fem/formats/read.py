@@ -60,6 +60,7 @@ FAULTS = (
     (r"(not enough values|cannot reshape|setting an array element).*", "numbers are missing"),
     (r"No (closing quotation|escaped character)", "a quoted name has no end"),
 )
+ASIDE = 1e-6  # of its length: how far the middle node of a straight line may lie beside it
 
 
 def read_vtu(path: Path) -> meshio.Mesh:
@@ -547,7 +548,7 @@ def straight_pieces(content: meshio.Mesh, kind: str, cells: ArrayLike, source: s
         square = np.sum(span**2, axis=1)
         share = np.sum(span * arm, axis=1) / np.where(square > 0.0, square, np.inf)
         aside = np.linalg.norm(arm - share[:, None] * span, axis=1)
-        bad = np.flatnonzero((aside > 1e-6 * np.sqrt(square)) | (np.abs(share - 0.5) >= 0.5))
+        bad = np.flatnonzero((aside > ASIDE * np.sqrt(square)) | (np.abs(share - 0.5) >= 0.5))
         if len(bad):
             raise ModelError(
                 f"{source}: line3 {bad[0]} (counted from 0) is not straight; a frame has straight"

@@ -8,6 +8,9 @@ from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
 from fem.mesh.cells import KINDS
 
+NO_LENGTH = 1e-12  # of the mesh: an edge so short has lost its direction
+OFF_MIDDLE = 0.35  # of an edge: farther off, a node is not the middle one that its place says
+
 
 def check_cells(source: str, kind: str, cells: IntArray, points: FloatArray) -> None:
     """Refuse cells of a known kind with a node twice, two at one place, or others out of place.
@@ -72,7 +75,7 @@ def _check_lengths(source: str, kind: str, cells: IntArray, points: FloatArray) 
     edges = np.array(KINDS[kind].edges)
     ends = points[cells[:, edges]]
     length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-    bad = np.argwhere(length <= 1e-12 * float(np.ptp(points, axis=0).max()))
+    bad = np.argwhere(length <= NO_LENGTH * float(np.ptp(points, axis=0).max()))
     if len(bad):
         cell, edge = bad[0]
         one, other = cells[cell, edges[edge]]
@@ -90,7 +93,7 @@ def _check_middles(source: str, kind: str, cells: IntArray, points: FloatArray) 
     middle = points[cells[:, first : first + len(edges)]]
     off = np.linalg.norm(middle - ends.mean(axis=2), axis=2)
     length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
-    bad = np.flatnonzero((off > 0.35 * length).any(axis=1))
+    bad = np.flatnonzero((off > OFF_MIDDLE * length).any(axis=1))
     if len(bad):
         cell = cell_at(kind, bad[0], points[cells[bad[0]]])
         raise ModelError(

@@ -33,6 +33,7 @@ FACET_KINDS = {
     (4, 8): "quad8",
     (4, 9): "quad9",
 }
+SAME_PLACE = 1e-12  # distance of a node and a place of the unit cell that are one
 """Kinds of facets by their numbers of corners and of nodes."""
 
 Indices = tuple[tuple[int, ...], ...]
@@ -195,7 +196,7 @@ class CellKind:
         """Index of the element's basis function that belongs to each node, shape (b,)."""
         places = np.asarray(self.element.doflocs, dtype=np.float64)
         distance = np.abs(self.nodes[:, None, :] - places[None, :, :]).max(axis=2)
-        assert (distance.min(axis=1) < 1e-12).all(), self.name
+        assert (distance.min(axis=1) < SAME_PLACE).all(), self.name
         return np.asarray(distance.argmin(axis=1), dtype=np.int64)
 
     @cached_property

@@ -14,6 +14,9 @@ from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError, quoted
 from fem.mesh.attachments import Attachments, LeftOut
 
+NO_LENGTH, LEAST_LENGTH = 1e-12, 1e-50  # of the frame, and in m: so short, a bar has no direction
+
+
 Number = TypeVar("Number", np.float64, np.int64)
 
 
@@ -178,7 +181,7 @@ class FrameMesh:
 
     def _check_elements(self) -> None:
         size = float(np.ptp(self.points, axis=0).max())
-        short = np.flatnonzero(self.lengths <= max(1e-12 * size, 1e-50))
+        short = np.flatnonzero(self.lengths <= max(NO_LENGTH * size, LEAST_LENGTH))
         if len(short):
             raise ModelError(f"{self.source}: element {short[0]} has zero length")
         _, first, count = np.unique(

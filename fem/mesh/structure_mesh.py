@@ -17,6 +17,7 @@ from fem.mesh.cells import CUBE, KINDS, PYRAMID, TETRAHEDRON, TRIANGLE, WEDGE
 from fem.mesh.frame_mesh import FrameMesh, index_sets, numbers
 
 POINTS, CELLS = " (points)", " (cells)"
+SAME_PLACE = 1e-9  # of the mesh: distance of nodes that are merged, unless given
 """After a name that a point set and a group share, to tell which is meant."""
 
 
@@ -390,7 +391,7 @@ def _merged(points: FloatArray, tolerance: float | None) -> tuple[IntArray, IntA
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    near = 1e-9 * float(np.ptp(points, axis=0).max()) if tolerance is None else tolerance
+    near = SAME_PLACE * float(np.ptp(points, axis=0).max()) if tolerance is None else tolerance
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
     count = len(points)
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))

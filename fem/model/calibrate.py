@@ -12,6 +12,10 @@ from scipy.optimize import least_squares
 from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError, quoted
 
+SETTLED = 1e-12  # relative change that a fit would still make
+SEEN = 1e-6  # share of the largest singular value, and of a direction, that counts
+
+
 Predictor = Callable[[dict[str, float]], Mapping[str, float]]
 
 
@@ -173,9 +177,9 @@ def calibrate(
         jac="3-point",
         bounds=(limits[:, 0] / scale, limits[:, 1] / scale),
         diff_step=np.full(len(names), step),
-        xtol=1e-12,
-        ftol=1e-12,
-        gtol=1e-12,
+        xtol=SETTLED,
+        ftol=SETTLED,
+        gtol=SETTLED,
     )
     freedom = len(wanted) - len(names)
     chi_square = 3.0 * float(np.sum(result.fun**2))
@@ -200,9 +204,9 @@ def calibrate(
 def _covariance(jacobian: FloatArray) -> FloatArray:
     """(JᵀJ)⁻¹; infinite variance for an unknown that a null direction of J moves."""
     _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
-    seen = singular > 1e-6 * singular.max(initial=0.0)
+    seen = singular > SEEN * singular.max(initial=0.0)
     covariance = (directions[seen].T / singular[seen] ** 2) @ directions[seen]
-    unseen = (directions[~seen] ** 2).sum(axis=0) > 1e-6
+    unseen = (directions[~seen] ** 2).sum(axis=0) > SEEN
     covariance[unseen, unseen] = np.inf
     return np.asarray(covariance, dtype=np.float64)
 

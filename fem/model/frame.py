@@ -29,6 +29,7 @@ TABLES: dict[str, tuple[object, str]] = {
     "parts": (BeamPart | TrussPart, "BeamPart and TrussPart"),
     "interfaces": (Interface, "Interface"),
 }
+OUT_OF_PLANE = 1e-9  # of the frame: height of a plane one
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +123,7 @@ class FrameModel:
 
     def _check_plane(self) -> None:
         z = self.mesh.points[:, 2]
-        if np.ptp(z) > 1e-9 * np.ptp(self.mesh.points, axis=0).max():
+        if np.ptp(z) > OUT_OF_PLANE * np.ptp(self.mesh.points, axis=0).max():
             raise ModelError(
                 f"{self.mesh.source}: a plane frame needs one z at all nodes,"
                 f" but z runs from {z.min():g} to {z.max():g}"

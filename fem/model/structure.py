@@ -24,6 +24,8 @@ from fem.model.supports import Foundation, Hinge, Interface, Support
 AXES = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
 """The six directions of a node, in the order of `StructureComponent.shape`."""
 IN_PLANE = ("x", "y", "rotation_z")
+NO_LENGTH = 1e-12  # of the mesh: so short, a beam has no direction
+OUT_OF_PLANE = 1e-9  # of the mesh: height of a plane one
 
 
 def axis_index(direction: str) -> int:
@@ -258,7 +260,7 @@ class StructureModel:
         self._check_doubles()
         for name, (_, lines) in self.beams.items():
             spans = mesh.points[lines[:, 1]] - mesh.points[lines[:, 0]]
-            short = np.flatnonzero(np.linalg.norm(spans, axis=1) <= 1e-12 * mesh.size)
+            short = np.flatnonzero(np.linalg.norm(spans, axis=1) <= NO_LENGTH * mesh.size)
             if len(short):
                 raise ModelError(f"{mesh.source}: line {short[0]} of {name!r} has zero length")
 
@@ -331,7 +333,7 @@ class StructureModel:
             raise ModelError(f"{self.mesh.source}: plane and three-dimensional parts do not mix")
         used = np.unique(np.concatenate([n.ravel() for n in self._part_cells()]))
         z = self.mesh.points[used, 2]
-        if np.ptp(z) > 1e-9 * self.mesh.size:
+        if np.ptp(z) > OUT_OF_PLANE * self.mesh.size:
             raise ModelError(
                 f"{self.mesh.source}: a plane structure needs one z at all nodes, but z runs from"
                 f" {z.min():g} to {z.max():g}"

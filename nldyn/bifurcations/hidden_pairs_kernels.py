@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import TINY, Real
 from nldyn.flow.kernels.compiling import inner, njit
 from nldyn.orbits import critical_functions
-from nldyn.orbits.critical_functions import NEAR_CIRCLE, number_outside, travel
+from nldyn.orbits.critical_functions import LEAST_MODULUS, NEAR_CIRCLE, number_outside, travel
 from nldyn.orbits.periodic_schur import product_eigenvalues
 from nldyn.runtime.kernel_cache import resting_on
 
@@ -222,8 +222,8 @@ def doubtful_in(ratios):
 
 @inner
 def distance(mu):
-    """ln|μ|, negative within the unit circle, not below ln 0.001."""
-    return math.log(max(abs(mu), 1e-3))
+    """ln|μ|, negative within the unit circle, not below that of `LEAST_MODULUS`."""
+    return math.log(max(abs(mu), LEAST_MODULUS))
 
 
 @inner

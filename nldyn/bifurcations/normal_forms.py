@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nldyn.base.arrays import Complex, Real
+from nldyn.base.arrays import SLACK, Complex, Real
 from nldyn.base.errors import (
     ConvergenceError,
     LocateError,
@@ -578,7 +578,7 @@ def others_outside(special: SpecialPoint) -> int:
     else:
         critical = -1.0 if special.kind == "PD" else 1.0
         rest = np.delete(mu, int(np.argmin(np.abs(mu - critical))))
-    return int(np.sum(np.abs(rest) > 1.0 + 1e-9))
+    return int(np.sum(np.abs(rest) > 1.0 + SLACK))
 
 
 def _other_multipliers(count: int) -> str:

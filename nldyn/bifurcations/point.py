@@ -11,6 +11,8 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, shown
 from nldyn.orbits.orbit import Orbit, shifted_alike, stroboscopic
 
+SAME_HZ, SAME_STATES = 1e-6, 1e-3  # relative, of an orbit at a special point or close beside it
+
 
 @dataclass(frozen=True, eq=False)
 class BranchNode:
@@ -103,7 +105,7 @@ def is_at(orbit: Orbit, special: SpecialPoint, multiple: int = 1) -> bool:
     other = special.orbit
     if orbit.period != multiple * other.period:
         return False
-    if not math.isclose(orbit.frequency_hz, special.frequency_hz, rel_tol=1e-6):
+    if not math.isclose(orbit.frequency_hz, special.frequency_hz, rel_tol=SAME_HZ):
         return False
     states = np.tile(stroboscopic(other), (multiple, 1))
-    return shifted_alike(stroboscopic(orbit), states, 1e-3 * float(np.abs(states).max()))
+    return shifted_alike(stroboscopic(orbit), states, SAME_STATES * float(np.abs(states).max()))

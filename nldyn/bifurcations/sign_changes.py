@@ -18,6 +18,8 @@ from nldyn.orbits.orbit import Orbit
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
 CRITICAL = {"LP": 1.0, "BP": 1.0, "PD": -1.0}  # multiplier at a special point
+ROUNDED_MODULUS = 1e-6  # error of a multiplier's modulus that may be rounding
+COMPLEX = 1e-6  # share of the imaginary part, above which a multiplier is not real
 
 
 def tests(point: BranchNode) -> dict[str, float]:
@@ -74,7 +76,7 @@ def accounted(a: Orbit, found: list[SpecialPoint], b: Orbit) -> bool:
 
 def _possible_outside(multipliers: Complex) -> set[int]:
     """Numbers of multipliers that may lie outside the unit circle, given their rounding."""
-    fewest, most = number_outside(multipliers, 1e-6)
+    fewest, most = number_outside(multipliers, ROUNDED_MODULUS)
     return set(range(fewest, most + 1))
 
 
@@ -95,7 +97,7 @@ def _pair_off_circle(multipliers: Complex) -> tuple[complex, float]:
 def _on_unit_circle(multipliers: Complex) -> bool:
     """Whether a complex pair (not a real pair μ, 1/μ) is what makes the torus test vanish."""
     mu = _pair_off_circle(multipliers)[0]
-    return bool(abs(mu.imag) > 1e-6 * abs(mu))
+    return bool(abs(mu.imag) > COMPLEX * abs(mu))
 
 
 def changed(a: BranchNode, b: BranchNode) -> list[str]:

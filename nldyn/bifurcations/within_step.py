@@ -219,7 +219,7 @@ def turned_over(
         ahead = (where - a.arclength) * (b.arclength - a.arclength) > 0.0
         first, last = (a, b) if ahead else (z, a)
         span = last.arclength - first.arclength
-        if abs(span) < 1e-6:
+        if abs(span) < SHORTEST_LOOK:
             return None
         sigma = min(max((where - first.arclength) / span, WITHIN), 1.0 - WITHIN)
         extra = Chord(first, last).at(sigma)

@@ -48,6 +48,7 @@ MOST_ITERATIONS = 12
 LONGEST_TURN = 0.3  # of the family from one orbit to the next, in rad
 SURELY = 1e-6  # beyond the unit circle, from which an orbit counts as unstable
 UNSEEN = 1e-12  # share of a mode at an interface that is rounding
+STRAIGHT = 1e-6  # turn of the tangent, below which it says no more of the next step
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +199,7 @@ def backbone(
             reason = f"step below {SHORTEST_STEP:g}: {family.obstacle}"
             break
         here, tangent, turn = found
-        step = min(LONGEST_STEP, step * min(1.5, 0.5 * LONGEST_TURN / max(turn, 1e-6)))
+        step = min(LONGEST_STEP, step * min(1.5, 0.5 * LONGEST_TURN / max(turn, STRAIGHT)))
         orbits.append(here)
         if here.max_abs_displacement > high:
             reason = "end of the range of amplitudes"

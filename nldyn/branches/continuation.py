@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import SLACK, Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_range, check_types, numbers
 from nldyn.bifurcations.branch_crossing import (
     NEIGHBOUR,
@@ -140,7 +140,7 @@ def _from_orbit(
     )
     check_minimal(orbit)
     low, high = check_range(range_hz)
-    if not low * (1.0 - 1e-9) <= orbit.frequency_hz <= high * (1.0 + 1e-9):
+    if not low * (1.0 - SLACK) <= orbit.frequency_hz <= high * (1.0 + SLACK):
         raise SystemModelError(
             f"the orbit at {orbit.frequency_hz:g} Hz lies outside range_hz = ({low:g}, {high:g})"
         )
@@ -375,7 +375,8 @@ def goes_on(leg: Leg, course: Course) -> bool:
         return False
     if ending is Ending.RANGE_END:
         low, high = course.range_hz
-        return low * (1.0 + 1e-9) < leg.nodes[-1].orbit.frequency_hz < high * (1.0 - 1e-9)
+        last_hz = leg.nodes[-1].orbit.frequency_hz
+        return low * (1.0 + SLACK) < last_hz < high * (1.0 - SLACK)
     if ending is Ending.MOST_POINTS:
         return options.max_points > end.count
     if ending is Ending.SHORT_STEP:

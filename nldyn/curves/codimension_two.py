@@ -8,6 +8,7 @@ import numpy as np
 
 from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import ConvergenceError
+from nldyn.bifurcations.sign_changes import COMPLEX
 from nldyn.orbits.bordered import CLEAR, Condition, Evaluation, nearest_depth
 from nldyn.orbits.conditions import BranchPointCondition, Grazing, Singular
 from nldyn.orbits.critical_functions import branch_point_test, flip_test, torus_test
@@ -142,7 +143,7 @@ def cosine_near(mu: Complex, cosine: float) -> float:
 def is_torus(mu: Complex) -> bool:
     """Whether the multipliers whose product is nearest to 1 are a complex pair."""
     value = mu[torus_pair(mu)[0]]
-    return bool(abs(value.imag) > 1e-6 * abs(value))
+    return bool(abs(value.imag) > COMPLEX * abs(value))
 
 
 def fold_coefficient(orbit: Orbit, left: Real, right: Real) -> float:

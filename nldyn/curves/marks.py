@@ -32,6 +32,7 @@ from nldyn.system.parameters import Parameter
 POLE = 1e-3  # of its values beside it: what a test is not below where it has no root but a pole
 NOISY = 0.1  # the same for a coefficient made of differences, whose rounding is a hundredth of them
 ALIKE = 1e-6  # share of a step within which touches are those of one orbit by symmetry
+TURNS_BACK = 1e-3  # part of a unit tangent along both parameters, at a cusp
 
 
 class Located(Protocol):
@@ -314,7 +315,7 @@ def _is_true(name: str, point: CurvePoint) -> bool:
     if name == "NSNS":
         return is_torus(np.delete(mu, torus_pair(mu)))
     if name == "CP":  # the parameters turn back
-        return bool(np.abs(point.tangent[-2:]).max() < 1e-3)
+        return bool(np.abs(point.tangent[-2:]).max() < TURNS_BACK)
     return True
 
 

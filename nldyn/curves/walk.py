@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from nldyn.base.arrays import TINY, Real
+from nldyn.base.arrays import SLACK, TINY, Real
 from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.bifurcations.period_doubling import passed_flip
 from nldyn.branches.arclength import (
@@ -610,7 +610,7 @@ class CurveWalk:
             share, which, limit = min(ends)
             name = charts[which].parameter.name
             self.stop_reason = Ending.PARAMETER_RANGE_END.told(parameter=name)
-            if share <= 1e-9:
+            if share <= SLACK:
                 return []
             end = on_chart_plane(here, there, which, limit)
             if end is None:

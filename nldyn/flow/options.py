@@ -13,6 +13,11 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_whole, is_finite, numbers, shown
 from nldyn.flow.kernels.layout import ROUND
 
+FINEST, COARSEST = 1e-13, 1e-2  # relative tolerances that can be met, and that tell orbits apart
+TAIL = 0.3  # of √rtol: the error of a Jacobian goes with the square of a panel's tail
+NODE_ANGLE, NODE_ANGLE_PER_DECADE = 0.95, 0.08  # rad at rtol = 1e-9, and more per power of ten
+LATEST = 1e-6  # error in the instant of an event, at most, as a share of the panel
+
 
 @dataclass(frozen=True)
 class FlowOptions:
@@ -41,7 +46,7 @@ class FlowOptions:
     tail: float | None = None
 
     def __post_init__(self) -> None:
-        if not (is_finite(self.rtol) and 1e-13 <= self.rtol <= 1e-2):
+        if not (is_finite(self.rtol) and FINEST <= self.rtol <= COARSEST):
             raise SystemModelError(
                 f"FlowOptions: rtol must lie between 1e-13 and 1e-2, got {shown(self.rtol)}"
             )
@@ -60,7 +65,7 @@ class FlowOptions:
     @property
     def panel_tail(self) -> float:
         """Legendre tail accepted on a panel."""
-        return self.tail or 0.3 * math.sqrt(self.rtol)
+        return self.tail or TAIL * math.sqrt(self.rtol)
 
     @property
     def node_angle(self) -> float:
@@ -69,13 +74,13 @@ class FlowOptions:
         Found by trials with up to 64 modes: with it, an undamped mode costs less than `rtol`, and
         the Jacobian less than ten times that where a contact is 1e-4 of the period.
         """
-        return 0.95 + 0.08 * (math.log10(self.rtol) + 9.0)
+        return NODE_ANGLE + NODE_ANGLE_PER_DECADE * (math.log10(self.rtol) + 9.0)
 
     @property
     def finer(self) -> FlowOptions:
         """A setting whose errors are negligible beside those of this one."""
         return FlowOptions(
-            max(1e-3 * self.rtol, 1e-13), min(self.panel_nodes + 4, 40), 0.03 * self.panel_tail
+            max(1e-3 * self.rtol, FINEST), min(self.panel_nodes + 4, 40), 0.03 * self.panel_tail
         )
 
     def instant(self, exponent: float) -> float:
@@ -86,8 +91,8 @@ class FlowOptions:
         two stops look simultaneous.
         """
         if exponent < ROUND:
-            return 1e-13
-        return min(float((1e-2 * self.rtol) ** (1.0 / exponent)), 1e-6)
+            return FINEST
+        return min(float((0.01 * self.rtol) ** (1.0 / exponent)), LATEST)
 
 
 def _floats(name: str, values: Real) -> Real:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.io import savemat
 
+from nldyn.base.arrays import SLACK
 from nldyn.base.errors import SystemModelError, check_types
 from nldyn.base.optional import optional
 from nldyn.orbits.history import History
@@ -128,7 +129,8 @@ def write_uff(history: History, path: Path) -> None:
 def function(time: Any, name: str, unit: str, kind: int, values: Any, node: int) -> dict[str, Any]:
     """A dataset 58: values at times, of a numbered interface or stop."""
     plain = name.encode("ascii", "replace").decode()
-    even = np.allclose(np.diff(time), (time[-1] - time[0]) / (time.size - 1), rtol=1e-9, atol=0.0)
+    step = (time[-1] - time[0]) / (time.size - 1)
+    even = np.allclose(np.diff(time), step, rtol=SLACK, atol=0.0)
     return {
         "type": 58,
         "binary": 0,

@@ -51,6 +51,11 @@ EVEN = 0.01  # relative difference of the ways that a body drifts in equal times
 MOST_CONFIRMATIONS = 10**4
 MOST_AVERAGED = 10**7  # periods of a first run
 LONGEST = 8  # a motion that has not decided itself is followed this much longer
+STILL = 0.1  # of `ON_ORBIT`: a run that moves less lies on its orbit
+NEARER = 0.9  # of its distance from an orbit, to which a motion must come that may approach it
+SLOWEST = 1e-12  # decay per period that is waited for
+MOST = 0.9  # share of a cloud's points with a neighbour within what counts as near
+REPEATS, MOVES = 1e-6, 1e-6  # of a run's size: what it returns to; a drift that is one
 
 
 @dataclass(frozen=True)
@@ -405,7 +410,7 @@ def _settled(flow: FlowMap, state: Real, omega: float, periods: int) -> tuple[Re
         sizes = np.linalg.norm(run, axis=1)
         largest = max(largest, float(sizes.max()))
         state, periods = run[-1], periods - len(run)
-        if float(np.linalg.norm(run - state, axis=1).max()) <= 0.1 * ON_ORBIT * largest:
+        if float(np.linalg.norm(run - state, axis=1).max()) <= STILL * ON_ORBIT * largest:
             break
     return state, largest
 
@@ -450,16 +455,16 @@ def _slow_orbit(
         left = _distance_later(flow, run[-1], orbit, omega, scale, last)
         if left <= ON_ORBIT:
             return (orbit, left), None
-        if left < 0.9 * first:
+        if left < NEARER * first:
             return None, orbit
     return None, None
 
 
 def _repeats(run: Real, max_period: int) -> int:
-    """Periods after which a run (k, 2n) repeats to 1e-6 of its size; 0 if it does not."""
+    """Periods after which a run (k, 2n) repeats to `REPEATS` of its size; 0 if it does not."""
     scale = float(np.linalg.norm(run, axis=1).max())
     for period in range(1, max_period + 1):
-        if np.all(np.linalg.norm(run[period:] - run[:-period], axis=1) <= 1e-6 * scale):
+        if np.all(np.linalg.norm(run[period:] - run[:-period], axis=1) <= REPEATS * scale):
             return period
     return 0
 
@@ -477,7 +482,7 @@ def _drifts(flow: FlowMap, run: Real) -> bool:
     steps = np.diff(means, axis=0)
     step = np.abs(steps.mean(axis=0))
     even = np.all(np.abs(steps - steps.mean(axis=0)) <= EVEN * step, axis=0)
-    return bool(np.any(even & (step > 1e-6 * _size(run, 0.0))))
+    return bool(np.any(even & (step > MOVES * _size(run, 0.0))))
 
 
 def _size(run: Real, floor: float) -> float:
@@ -498,7 +503,7 @@ def _distance_later(
     if distance <= ON_ORBIT:
         return distance
     decay = -orbit.stability.log_modulus / orbit.period
-    needed = 2.0 * math.log(max(distance, 10.0 * ON_ORBIT) / ON_ORBIT) / max(decay, 1e-12)
+    needed = 2.0 * math.log(max(distance, 10.0 * ON_ORBIT) / ON_ORBIT) / max(decay, SLOWEST)
     count = int(min(needed, LONG_RUN)) + orbit.period
     moved, _ = transient_end(flow, state, omega, count)
     return math.inf if moved is None else _distance(orbit, moved) / scale
@@ -688,7 +693,7 @@ def overlap(a: Real, b: Real) -> bool:
 
     def mostly_inside(points: Real, cloud: Real) -> bool:
         tree = cKDTree(cloud)
-        own = np.quantile(np.asarray(tree.query(cloud, k=2)[0])[:, 1], 0.9)
+        own = np.quantile(np.asarray(tree.query(cloud, k=2)[0])[:, 1], MOST)
         return bool(np.mean(np.asarray(tree.query(points)[0]) <= 3.0 * own) > 0.5)
 
     return mostly_inside(a, b) and mostly_inside(b, a)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import SLACK, TINY, Real
 from nldyn.base.errors import (
     SystemModelError,
     check_frequency,
@@ -45,6 +45,8 @@ SHELLS = (1.0, 0.5, 0.2)  # of a neighbourhood, on which its contraction is trie
 LINGERS = 48  # periods in a row near an attractor that is not periodic
 MOST_CELLS = 10**7
 UNDECIDED = -1
+MOST = 0.95  # share of an attractor's states with a neighbour within a third of its radius
+IN_PLANE, SMALLEST = 1e-6, 1e-6  # of a state: its distance from a plane; radius about an orbit
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +182,7 @@ class StatePlane:
         found, *_ = np.linalg.lstsq(basis / unit, (modal - self.origin).T, rcond=None)
         off = np.linalg.norm(modal - self.origin - (basis / unit @ found).T, axis=1)
         size = np.linalg.norm(modal, axis=1)
-        return found.T / unit, off <= 1e-6 * np.maximum(size, 1e-300)
+        return found.T / unit, off <= IN_PLANE * np.maximum(size, TINY)
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,7 +333,7 @@ def target_of(attractor: Attractor) -> Target:
         return _orbit_target(attractor.orbit)
     tree = cKDTree(attractor.states)
     own = np.asarray(tree.query(attractor.states, k=2)[0])[:, 1]
-    return Target(attractor.states, None, 3.0 * float(np.quantile(own, 0.95)))
+    return Target(attractor.states, None, 3.0 * float(np.quantile(own, MOST)))
 
 
 def _orbit_target(orbit: Orbit) -> Target:
@@ -369,7 +371,7 @@ def _orbit_target(orbit: Orbit) -> Target:
                     return False
         return True
 
-    while radius > 1e-6 * scale and not all(comes_nearer(k, radius) for k in range(period)):
+    while radius > SMALLEST * scale and not all(comes_nearer(k, radius) for k in range(period)):
         radius /= 1.5
     return Target(states, np.array(shapes) / radius**2, 0.0)
 
@@ -665,7 +667,7 @@ def _check_known(attractors: Sequence[Attractor], system: System, frequency_hz: 
     """Refuse attractors of another system or frequency than those of the basins."""
     for k, attractor in enumerate(attractors):
         check_types(**{f"attractors: entry {k}": (attractor, Attractor)})
-        if not math.isclose(attractor.frequency_hz, frequency_hz, rel_tol=1e-9):
+        if not math.isclose(attractor.frequency_hz, frequency_hz, rel_tol=SLACK):
             raise SystemModelError(
                 f"attractors: entry {k} is one at {attractor.frequency_hz:g} Hz, but the basins "
                 f"are asked for at {frequency_hz:g} Hz"

@@ -31,6 +31,7 @@ FEWEST_BLOCKS = 16  # from which an error is estimated
 SQUEEZE = 4.0  # most e-foldings by which the linear part may shrink a direction over a segment
 CLEAR = 3.0  # standard errors
 RESOLVED = 1e-3  # least logarithm of a shrinkage over all periods that is told from none
+SLOW_GROWTH = 5.0  # logarithm of a growth that goes with a power of the time, beside that of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +128,7 @@ class LyapunovSpectrum:
 
     @property
     def _slow_growth(self) -> float:
-        return 5.0 + math.log(self.periods)
+        return SLOW_GROWTH + math.log(self.periods)
 
     @property
     def dimension(self) -> float:

@@ -23,6 +23,7 @@ FIRST = 1e-5  # how far the first, straight piece reaches, as a share of the pla
 HALVINGS = 30
 LINGER = 64  # periods for which a motion from the edge is followed
 MARGIN = 1.0  # how far beyond the plane a manifold is followed, in units of its sides
+SOLVED, LONGEST_STEP = 1e-10, 0.2  # Newton's steps, in units of the plane
 
 
 def stable_manifold(
@@ -177,9 +178,9 @@ class _Inverse:
             size = float(np.linalg.norm(step))
             if not math.isfinite(size):
                 return None
-            if size < 1e-10:
+            if size < SOLVED:
                 return np.asarray(here + step)
-            step *= min(1.0, 0.2 / size)
+            step *= min(1.0, LONGEST_STEP / size)
             for _ in range(tries):
                 there = self.image(here + step)
                 if tries == 1 or (there and _distance(point, there[0]) < _distance(point, image)):

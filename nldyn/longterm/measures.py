@@ -19,7 +19,7 @@ from nldyn.branches.branch import Branch
 from nldyn.longterm.attractors import Attractor
 from nldyn.longterm.impacts import check_stop, impacts, panel_table
 from nldyn.longterm.poincare import BruteForce
-from nldyn.longterm.simulation import MOST_RECORDED, Motion, motion_of
+from nldyn.longterm.simulation import MOST_RECORDED, WHOLE, Motion, motion_of
 from nldyn.orbits.harmonics import modal_row
 from nldyn.orbits.orbit import Orbit
 from nldyn.runtime.executors import check_execution, values_of
@@ -439,7 +439,7 @@ def _spectrum(
     motion, name, stable = _motion_on(source, periods)
     row = modal_row(motion.system, point)
     hz = _constant_omega(motion) / (2.0 * math.pi)
-    turns = math.floor(motion.duration * hz + 1e-6)
+    turns = math.floor(motion.duration * hz + WHOLE)
     if turns < 1:
         raise SystemModelError("a spectrum needs a motion of at least one excitation period")
     count = SAMPLES * math.ceil(orders / 32)
@@ -523,7 +523,7 @@ def power_spectrum(
     row = modal_row(motion.system, point)
     hz = _constant_omega(motion) / (2.0 * math.pi)
     rate = samples_per_period * hz
-    count = int(motion.duration * rate + 1e-6)
+    count = int(motion.duration * rate + WHOLE)
     if count < 16:
         raise SystemModelError(f"a power spectrum needs 16 samples, the motion gives {count}")
     states = motion.states(motion.start_time + np.arange(count) / rate)

@@ -11,7 +11,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import SLACK, TINY, Real
 from nldyn.base.errors import (
     ConvergenceError,
     SystemModelError,
@@ -34,6 +34,7 @@ PIECE = 2000  # periods of a transient whose states are held at once
 MOST_STEPS = 10**6  # of a sweep, and
 MOST_RECORDED = 10**6  # periods of a recorded motion: 1 to 5 kB each with 1 to 4 modes
 MOST_PERIODS = 10**8
+WHOLE = 1e-6  # of a period: what may be missing at its end
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +135,7 @@ class Motion:
     def _checked(self, time: Real | float) -> Real:
         """Times within the motion as an array."""
         time = numbers("time", time)
-        slack = 1e-9 * max(abs(self.end_time), 1e-300)
+        slack = SLACK * max(abs(self.end_time), TINY)
         if time.size and (
             time.min() < self.start_time - slack or time.max() > self.end_time + slack
         ):
@@ -245,7 +246,7 @@ class Motion:
         turns = [0.0]
         for stretch in self.stretches:
             turns.append(turns[-1] + end_phase(stretch) - float(stretch.record.phase[0]))
-        total = math.floor(turns[-1] / (2.0 * math.pi) + 1e-6)
+        total = math.floor(turns[-1] / (2.0 * math.pi) + WHOLE)
         ends = np.interp(2.0 * np.pi * np.arange(total + 1), turns, self.begins)
         return ends, 1.0 / np.diff(ends)
 
@@ -643,7 +644,7 @@ def chirp_steps(first: float, last: float, rate: float, steps: int) -> tuple[Rea
 def _chirp_count(first: float, last: float, rate: float, steps: int) -> tuple[int, float]:
     """Number of steps of a sweep, and the phase at its end."""
     total = math.pi * abs(last**2 - first**2) / rate
-    count = math.ceil(total * steps / (2.0 * math.pi) - 1e-9)
+    count = math.ceil(total * steps / (2.0 * math.pi) - SLACK)
     if count > MOST_STEPS:
         raise SystemModelError(
             f"the sweep takes {count} steps of constant frequency, at most {MOST_STEPS} are "

@@ -13,6 +13,7 @@ from nldyn.system.ride import Ride
 from nldyn.system.system import System
 
 MOST_SAMPLES = 2**18
+SETTLED = 1e-9  # relative change of the largest coefficient with twice the samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +97,7 @@ def harmonics(orbit: Orbit, interface: str | Real | None = None, *, orders: int 
     while samples < MOST_SAMPLES:
         samples *= 2
         coarser, found = found, _coefficients(orbit, phi, ride, lines, samples)
-        if np.abs(found - coarser).max() <= 1e-9 * np.abs(found).max():
+        if np.abs(found - coarser).max() <= SETTLED * np.abs(found).max():
             break
     multiples = np.arange(lines + 1, dtype=float)
     return Harmonics(multiples * (orbit.frequency_hz / orbit.period), found)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import SLACK, Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, check_whole, numbers
 from nldyn.flow.flow_map import FlowError, FlowMap, Solution, Trajectory, chain
 from nldyn.flow.rigid import (
@@ -42,6 +42,7 @@ SAME = 1e-5  # distance of orbits that are one, relative to their size
 REPEATS = 1e-6  # the same of an orbit from itself some periods later
 SHALLOW = 1e-3  # of the deepest extreme: depths up to it are told exactly where stops are touched
 LARGEST_EXPONENT = 700.0  # of a finite exponential
+LOST = 1e-6  # rounding of a determinant's logarithm, above which it tells nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,7 +290,7 @@ class Orbit:
         strong that rounding hides the third digit of 1e-6 even so.
         """
         value, rounding = log_determinant(self._spectrum[1])
-        if rounding > 1e-6:
+        if rounding > LOST:
             return math.nan
         exact = -float(np.trace(self.system.total_damping)) * self.duration
         exact -= contact_damping(self.problem.flow, self.trajectory)
@@ -474,7 +475,7 @@ class Orbit:
             lambda where: -force(where),
             bounds=(phase - reach, phase),
             method="bounded",
-            options={"xatol": 1e-9 * max(reach, 1e-9)},
+            options={"xatol": SLACK * max(reach, SLACK)},
         )
         return max(-float(found.fun), force(phase))
 
@@ -634,7 +635,7 @@ def stroboscopic(orbit: Orbit) -> Real:
 
 def same_orbit(a: Orbit, b: Orbit) -> bool:
     """Whether two orbits at one frequency agree up to a shift by whole excitation periods."""
-    if a.period != b.period or not math.isclose(a.omega, b.omega, rel_tol=1e-9):
+    if a.period != b.period or not math.isclose(a.omega, b.omega, rel_tol=SLACK):
         return False
     return shifted_alike(stroboscopic(a), stroboscopic(b), SAME * a.problem.scale(a.point))
 

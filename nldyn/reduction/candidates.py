@@ -19,6 +19,7 @@ INVISIBLE = 1e-6
 MOST_MODES = 60
 PULSE = 1.5  # a half sine of duration T has its first spectral zero at 1.5 / T
 BEYOND = 2.0
+ENOUGH = 1.1  # times the cutoff: modes up to there need not be computed anew
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ def candidate_modes(component: cms.ComponentLike, setting: LoadCase) -> Candidat
         whole = cms.reduce(component, cutoff_hz=BEYOND * cutoff)
         contact = shortest_contact(setting, cms.keep_modes(whole, below(whole, cutoff)))
         longer = max(setting.range_hz[1], PULSE / contact)
-        if longer <= 1.1 * cutoff or whole.modes > MOST_MODES:
+        if longer <= ENOUGH * cutoff or whole.modes > MOST_MODES:
             break
         cutoff = longer
     seen = visible(whole, setting)

@@ -12,7 +12,7 @@ import numpy as np
 
 import cms
 from cms.component.component import checked_pencil
-from nldyn.base.arrays import Complex, Real
+from nldyn.base.arrays import SLACK, Complex, Real
 from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch
@@ -55,6 +55,9 @@ QUANTITIES = {
     "force": "contact force",
     "contact": "contact duration",
 }
+SAID = (1e-2, 1e-4)  # relative errors for which it is said how many modes suffice
+MOVED = 1.001  # times an orbit: the start from which the time of Newton's method is measured
+VISIBLE = 1e-6  # of the largest displacement at an interface: that of a mode which is seen there
 
 
 @dataclass(frozen=True, eq=False)
@@ -351,7 +354,7 @@ class ConvergenceStudy:
             if all(np.isnan(getattr(self.errors[index], quantity)) for index in indices):
                 continue
             said = []
-            for tolerance in (1e-2, 1e-4):
+            for tolerance in SAID:
                 model = self.enough(quantity, tolerance, indices)
                 place = f"from {size(model)}" if model else "not reached"
                 said.append(f"{100 * tolerance:g} % {place}")
@@ -593,7 +596,7 @@ def measured_linear(
 ) -> Measured:
     """Counts, visible eigenfrequencies and receptance of a model."""
     rows = np.array(list(reduced.participation.values()))
-    seen = np.any(np.abs(rows) > 1e-6 * np.abs(rows).max(axis=1, keepdims=True), axis=0)
+    seen = np.any(np.abs(rows) > VISIBLE * np.abs(rows).max(axis=1, keepdims=True), axis=0)
     return Measured(
         mesh,
         method,
@@ -761,7 +764,7 @@ def harmonic_branch(system: System, setting: LoadCase, tell: Callable[[float], N
     tell(high)
     try:
         orbit = solve_orbit(
-            FlowMap(system), high * (1.0 - 1e-9), observe=setting.observe, seconds=LONGEST_SEARCH
+            FlowMap(system), high * (1.0 - SLACK), observe=setting.observe, seconds=LONGEST_SEARCH
         )
     except ConvergenceError as error:
         rigid = system.free_modes
@@ -790,7 +793,7 @@ def seconds_per_orbit(orbit: Orbit, repeats: int = 9) -> float:
     problem, times = orbit.problem, []
     for _ in range(repeats):
         start = time.perf_counter()
-        refine(problem, problem.nodes(orbit.point) * 1.001, orbit.omega, orbit.observe)
+        refine(problem, problem.nodes(orbit.point) * MOVED, orbit.omega, orbit.observe)
         times.append(time.perf_counter() - start)
     return min(times)
 

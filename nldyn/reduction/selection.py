@@ -27,6 +27,7 @@ from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.system.system import System
 
 SAMPLES = 9
+FINEST = 1e-6  # tolerance of a selection, at least: eigenfrequencies have few more digits
 
 
 @dataclass(frozen=True)
@@ -186,8 +187,10 @@ def select_modes(
     4. The error of the reference is judged by that of the model with all modes up to the cut-off;
        both differences together make the band. So it is for folds and flips.
     """
-    if not (is_finite(tolerance) and 1e-6 <= tolerance < 1.0):
-        raise SystemModelError(f"tolerance must lie in [1e-6, 1), got {shown(tolerance)}")
+    if not (is_finite(tolerance) and FINEST <= tolerance < 1.0):
+        raise SystemModelError(
+            f"tolerance must lie in [{FINEST:g}, 1), got {shown(tolerance)}"
+        )
     visible = candidate_modes(component, setting)
     whole, seen, cutoff = visible.whole, visible.seen, visible.cutoff_hz
     shares = Shares(progress or silent, {"reference": 3.0, "modes": 1.0})

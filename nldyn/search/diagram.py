@@ -77,6 +77,7 @@ PROBED = 5  # periods flown before the one whose work is counted
 TRIED = 20  # flights through the period in an attempt of Newton's method that leads nowhere
 TOLD = 60.0  # s of a search from which on its time is told at its beginning
 MORE_STARTS = 4  # times as many in the second search, which looks for orbits with contact
+SHIFTS = (0.0, 0.005, -0.005, 0.01, -0.01, 0.02, -0.02, 0.03, -0.03)  # relative, from a seed
 
 
 @dataclass(frozen=True)
@@ -792,7 +793,7 @@ def _contact_is_missing(box: Collector) -> bool:
 
 def _follow_seed(box: Collector, seed: SubharmonicSeed, effort: OrbitSearchOptions) -> None:
     """Look around a seed's frequency, nearest first, until a new branch turns up."""
-    for shift in (0.0, 0.005, -0.005, 0.01, -0.01, 0.02, -0.02, 0.03, -0.03):
+    for shift in SHIFTS:
         frequency = seed.near_hz * (1.0 + shift)
         if not box.range_hz[0] <= frequency <= box.range_hz[1]:
             continue

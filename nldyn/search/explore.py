@@ -54,6 +54,7 @@ TRANSIENT = 5  # periods of a motion beside which no orbits are looked for
 PIECE = 16  # periods simulated between two looks at the known orbits; later a quarter of all
 LIKELY_ROUNDS = 2  # after which, mostly, a round has found nothing new
 AGAIN = 12  # times that a frequency is searched again while its indices say that orbits are missing
+NEAR_ORBIT = 1e-4  # of a run's size: from its end to the orbit on which it lies
 
 
 class ExplorationFile(Protocol):
@@ -397,7 +398,7 @@ class _Survey:
         """Stable orbit to which a run comes near at its end, one of the known ones if it can be."""
         scale = float(np.linalg.norm(run, axis=1).max()) or 1.0
         for orbit in known:
-            if _nearest(stroboscopic(orbit), run[-1]) < 1e-4 * scale:
+            if _nearest(stroboscopic(orbit), run[-1]) < NEAR_ORBIT * scale:
                 return orbit
         for period in range(1, self.max_period + 1):
             tail = run[-period - self.max_period :]

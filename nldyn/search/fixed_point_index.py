@@ -20,6 +20,7 @@ from nldyn.system.system import System
 RESOLVED = 1e-8  # relative width of a range of frequencies that counts
 CLEAR = 1e-6  # distance of |1 - μ| from where an index changes, to be told from it
 NOTE = "indices of the fixed points of "  # how the note on them begins
+SAME = 1e-12  # relative difference of frequencies that are one
 
 
 def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) -> int:
@@ -158,7 +159,7 @@ def _checked(
         raise SystemModelError(f"{caller}: branches must not be empty")
     for branch in branches:
         a, b = branch.course.range_hz if branch.course else (0.0, math.inf)
-        if not a * (1.0 - 1e-12) <= low <= high <= b * (1.0 + 1e-12):
+        if not a * (1.0 - SAME) <= low <= high <= b * (1.0 + SAME):
             asked = f"{low:g}" if low == high else f"{low:g} to {high:g}"
             raise SystemModelError(
                 f"{caller}: branch '{branch.name}' was followed from {a:g} to {b:g} Hz, "

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from nldyn.base.arrays import SLACK
 from nldyn.base.errors import (
     LARGEST_FREQUENCY,
     SMALLEST_FREQUENCY,
@@ -67,6 +68,7 @@ NAMES = (
     *(FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_SPRINGS),
     *(*OF_SPRINGS, *_OF_MODES, SPIN, SPEED),
 )
+LAST_DIGIT = 1e-14  # relative: a value so near to the end of its range is that
 
 
 def has_exact_derivatives(parameter: Parameter) -> bool:
@@ -154,7 +156,7 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
         return frequency_hz
     if name in (SPIN, SPEED):
         hz = spin_of(system, parameter)
-        if name == SPEED and abs(hz - frequency_hz) > 1e-9 * frequency_hz:
+        if name == SPEED and abs(hz - frequency_hz) > SLACK * frequency_hz:
             raise SystemModelError(
                 f"parameter '{SPEED}': the shaft spins at {hz:g} Hz, but the excitation has "
                 f"{frequency_hz:g} Hz; begin where they are equal"
@@ -240,7 +242,7 @@ def _damping_ratio(system: System, index: int) -> float:
     if np.any(natural == 0.0):
         raise SystemModelError("parameter 'modal_damping': a mode at 0 Hz has no damping ratio")
     ratios = system.damping[modes, modes] / (2.0 * natural)
-    if np.ptp(ratios) > 1e-9 * np.abs(ratios).max():
+    if np.ptp(ratios) > SLACK * np.abs(ratios).max():
         raise SystemModelError(
             "parameter 'modal_damping': the modes have different ratios; change one mode's"
         )
@@ -305,7 +307,7 @@ class Chart:
 
     def check_start(self, value: float) -> None:
         """Refuse a start outside the range."""
-        slack = 1e-9 * max(abs(self.low), abs(self.high))
+        slack = SLACK * max(abs(self.low), abs(self.high))
         if not self.low - slack <= value <= self.high + slack:
             raise SystemModelError(
                 f"the start has {self.parameter.name} = {value:g}, outside its range "
@@ -325,7 +327,7 @@ class Chart:
         """Value at a coordinate; rounding does not carry it past an end of the range."""
         value = math.exp(coordinate) if self.logarithmic else coordinate * (self.high - self.low)
         for end in (self.low, self.high):
-            if abs(value - end) <= 1e-14 * max(abs(self.low), abs(self.high)):
+            if abs(value - end) <= LAST_DIGIT * max(abs(self.low), abs(self.high)):
                 return end
         return value
 

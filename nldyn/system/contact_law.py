@@ -12,6 +12,13 @@ from nldyn.base.errors import SystemModelError
 
 ContactLaw = Callable[[float, float], tuple[float, float, float]]
 SHALLOW = 1e-6, 1e-8  # of the penetration at which the power law gives 1 N
+TRIED, SPEED = (1e-3, 0.1, 1.0), 0.1  # penetrations over their unit, and m/s, at which it is tried
+DIGITS = 1e-14  # relative rounding of a law
+WRONG_SLOPE, VANISHED, SAME = 1e-4, 1e-4, 0.01  # relative differences: of slopes, of 0, of forces
+LEAST_POWER, PER_DOUBLING, PLACES = -26.5, 8.0, 319  # where a kink is looked for, from 1e-8 on
+MAY_JUMP, NARROW = 0.05, 1e-10  # relative change between two of them; within it, a kink is found
+STEP = 1e-6  # of the differences: in penetrations, and in m/s
+ALL_BUT_NONE = 1e-9  # penetration over its unit, where a force must be all but zero
 
 
 def power_law(
@@ -79,11 +86,11 @@ def check_law(owner: str, law: ContactLaw, stiffness: float, exponent: float) ->
         With the first pair at which something is wrong.
     """
     unit = stiffness ** (-1.0 / exponent)
-    for share in (1e-3, 0.1, 1.0):
-        for speed in (0.0, 0.1, -0.1):
+    for share in TRIED:
+        for speed in (0.0, SPEED, -SPEED):
             delta = share * unit
             force, stiff, viscous = _values(owner, law, delta, speed)
-            step, jolt = 1e-6 * delta, 1e-6
+            step, jolt = STEP * delta, STEP
             rise = _values(owner, law, delta + step, speed)[0]
             fall = _values(owner, law, delta - step, speed)[0]
             faster = _values(owner, law, delta, speed + jolt)[0]
@@ -92,15 +99,15 @@ def check_law(owner: str, law: ContactLaw, stiffness: float, exponent: float) ->
                 ("penetration", stiff, rise - fall, 2.0 * step),
                 ("speed", viscous, faster - slower, 2.0 * jolt),
             ):
-                rounding = 1e-14 * abs(force) / width
-                if abs(change / width - slope) > 1e-4 * abs(slope) + 100.0 * rounding:
+                rounding = DIGITS * abs(force) / width
+                if abs(change / width - slope) > WRONG_SLOPE * abs(slope) + 100.0 * rounding:
                     raise SystemModelError(
                         f"{owner}: law says {slope:g} for the derivative by the {name} at "
                         f"penetration {delta:g} m and speed {speed:g} m/s, but its force changes "
                         f"by {change / width:g}"
                     )
-    tiny = abs(_values(owner, law, 1e-9 * unit, 0.1)[0])
-    if tiny > 1e-4 * max(abs(_values(owner, law, unit, 0.1)[0]), 1.0):
+    tiny = abs(_values(owner, law, ALL_BUT_NONE * unit, SPEED)[0])
+    if tiny > VANISHED * max(abs(_values(owner, law, unit, SPEED)[0]), 1.0):
         raise SystemModelError(
             f"{owner}: law must vanish with the penetration; a spring with a damper beside it is "
             "`dashpot` of a linear stop"
@@ -116,7 +123,7 @@ def _check_declared(owner: str, law: ContactLaw, stiffness: float, exponent: flo
         delta = share * unit
         force = _values(owner, law, delta, 0.0)[0]
         declared = stiffness * delta**exponent
-        if _differ(force, declared, 0.01):
+        if _differ(force, declared, SAME):
             raise SystemModelError(
                 f"{owner}: law gives {force:g} N at a penetration of {delta:g} m, but its "
                 f"stiffness {stiffness:g} and exponent {exponent:g} say {declared:g} N: declare "
@@ -133,10 +140,10 @@ def _check_smooth(owner: str, law: ContactLaw, unit: float) -> None:
     """
 
     def values(exponent: float) -> tuple[float, float]:
-        force, stiff, _ = _values(owner, law, unit * 2.0**exponent, 0.1)
+        force, stiff, _ = _values(owner, law, unit * 2.0**exponent, SPEED)
         return force, stiff
 
-    points = [-26.5 + k / 8.0 for k in range(319)]
+    points = [LEAST_POWER + k / PER_DOUBLING for k in range(PLACES)]
     for which, name in enumerate(("force", "derivative by the penetration")):
         known = []
         for point in points:
@@ -145,16 +152,16 @@ def _check_smooth(owner: str, law: ContactLaw, unit: float) -> None:
             except SystemModelError:  # beyond what can be computed, as of an exponential law
                 break
         for k in range(len(known) - 1):
-            if _differ(known[k], known[k + 1], 0.05):
+            if _differ(known[k], known[k + 1], MAY_JUMP):
                 low, high, below, above = points[k], points[k + 1], known[k], known[k + 1]
-                while high - low > 1e-10:
+                while high - low > NARROW:
                     middle = 0.5 * (low + high)
                     between = values(middle)[which]
                     if abs(between - below) > abs(above - between):
                         high, above = middle, between
                     else:
                         low, below = middle, between
-                if _differ(below, above, 0.01):
+                if _differ(below, above, SAME):
                     raise SystemModelError(
                         f"{owner}: law is not smooth: its {name} jumps from {below:g} to {above:g} "
                         f"at penetration {unit * 2.0**low:g} m; use several stops with gaps of "

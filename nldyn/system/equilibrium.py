@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from nldyn.base.arrays import Complex, Real
+from nldyn.base.arrays import SLACK, TINY, Complex, Real
 from nldyn.base.errors import SystemModelError
 from nldyn.system.contact_law import power_law
 from nldyn.system.rigid_stop import RigidStop
@@ -24,6 +24,8 @@ SAME = 1e-6  # share of their size by which two of them may differ
 FARTHEST = 1e9  # m kg^0.5, where a motion counts as running away
 BALANCED = 1e-9  # share of the forces that may be left at rest
 SHARE = 0.1  # of the decrease that the slope foretells, with which a step is taken
+DOUBLINGS, SEEN = 20.0, 1e-12  # of the steps that look for a fall of the energy; one that is seen
+FIRST_MOVE = 1e-3  # of the way to where the energy rises again: the start of a descent
 
 
 def rest(system: System) -> Real:
@@ -125,7 +127,7 @@ def _rests_of_bonds(system: System, push: Real) -> Iterator[Real]:
         forces[:2] += -float(push @ way), float(way @ system.stiffness @ way)
         forces = np.trim_zeros(forces, "b")
         for root in np.polynomial.polynomial.polyroots(forces) if forces.size > 1 else ():
-            if abs(root.imag) <= 1e-9 * abs(root):
+            if abs(root.imag) <= SLACK * abs(root):
                 yield root.real * way
 
 
@@ -150,9 +152,9 @@ def _falls(system: System, push: Real, q: Real, way: Real) -> bool:
     """Whether the energy falls from q along a direction without curvature, either way."""
     here = potential_at(system, push, q)
     size = max(float(np.abs(_vector(system, bond) @ way)) for bond in system.bonds) or 1.0
-    for step in 2.0 ** np.arange(-20.0, 20.0) / size:
+    for step in 2.0 ** np.arange(-DOUBLINGS, DOUBLINGS) / size:
         sides = np.array([potential_at(system, push, q + s * way) for s in (step, -step)]) - here
-        if np.abs(sides).max() > 1e-12 * abs(here) + 1e-300:
+        if np.abs(sides).max() > SEEN * abs(here) + TINY:
             return bool(sides.min() < 0.0)
     return False
 
@@ -167,7 +169,7 @@ def _beside(system: System, push: Real, q: Real, way: Real) -> Real:
     ]
     rises = np.flatnonzero(np.diff(energies) > 0.0)
     rises = rises[np.array(energies)[rises] < energies[0]]
-    return np.asarray(1e-3 * steps[rises[0] if rises.size else 0] / size * way)
+    return np.asarray(FIRST_MOVE * steps[rises[0] if rises.size else 0] / size * way)
 
 
 def _length(system: System, *states: Real) -> float:

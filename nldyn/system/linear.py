@@ -66,6 +66,10 @@ _SPLITS = (1e-11, 3e-11, 1e-10)
 _LARGEST_RATE = 1e100  # its square is far from the largest floating-point number
 _EPS = float(np.finfo(float).eps)
 _MOST_SWEEPS = 30  # of rotations; they converge quadratically
+_ROUNDED = 1e-12  # of the largest: an eigenvalue, or a rate over the frequency, that may be zero
+_FEW = 8.0  # roundings of each mode in a sum over all
+_SLOW = 1e-3  # of the fastest mode: a slower one is scaled as that
+_LOST = 1e-16  # of the faster rate: a slower one that does not count beside it
 
 
 @dataclass(frozen=True)
@@ -241,7 +245,7 @@ class ForcedResponse:
                 "give the mode some damping or move the frequency",
             )
         drifts = np.isin(terms.kinds, (DRIFT, DRIFT_ON))
-        still = slowest_rate(terms.rates.real, terms.rates.imag) < 1e-12 * omega
+        still = slowest_rate(terms.rates.real, terms.rates.imag) < _ROUNDED * omega
         if np.any(driven & drifts & still):
             return (
                 "a constant force acts on a body that nothing but a stop holds",
@@ -290,7 +294,7 @@ class ForcedResponse:
 
 def at_resonance(eigenvalues: Complex, omega: float | Real) -> NDArray[np.bool_]:
     """Which eigenvalues are iω but for rounding: of an undamped mode at its own frequency."""
-    return np.asarray(np.abs(eigenvalues - 1j * omega) < 1e-12 * omega)
+    return np.asarray(np.abs(eigenvalues - 1j * omega) < _ROUNDED * omega)
 
 
 def diagonalised(omega: Real, added: Real) -> tuple[Real, Real]:
@@ -322,7 +326,7 @@ def diagonalised(omega: Real, added: Real) -> tuple[Real, Real]:
             K[i, j] = K[j, i] = 0.0
             modes[:, pair] = modes[:, pair] @ turn
     squares = np.diag(K).copy()
-    rounding = 8.0 * n * _EPS * (modes**2).T @ sizes
+    rounding = _FEW * n * _EPS * (modes**2).T @ sizes
     if np.any(squares < -rounding):
         raise SystemModelError(
             "springs make the linear stiffness negative in a direction, so that the structure runs "
@@ -357,10 +361,10 @@ def linear_part(
         raise SystemModelError(
             f"frequencies_hz or damping beyond {_LARGEST_RATE:g} 1/s cannot be computed with"
         )
-    if np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] < -1e-12 * (1.0 + abs(damping).max()):
+    if np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] < -_ROUNDED * (1.0 + abs(damping).max()):
         raise SystemModelError("damping must not feed energy in (the matrix has a negative part)")
     cross = np.zeros((n, n)) if cross is None else cross
-    slow = 1e-3 * (omega.max() or 1.0)
+    slow = _SLOW * (omega.max() or 1.0)
     unit = np.where(omega > slow, omega, np.maximum(slow, held))
     blocks, columns, scales = [], [], []
     groups, group_of = connected_components((damping != 0.0) | (cross != 0.0), directed=False)
@@ -400,7 +404,7 @@ def linear_part(
 def _check_bounded(blocks: Real) -> None:
     """Refuse a skew stiffness that feeds in more energy than the damping takes out."""
     values = np.linalg.eigvals(blocks)
-    if values.real.max() > 1e-12 * np.abs(values).max():
+    if values.real.max() > _ROUNDED * np.abs(values).max():
         worst = values.ravel()[values.real.argmax()]
         raise SystemModelError(
             f"the nonsymmetric stiffness lets the motion at {abs(worst.imag) / (2 * np.pi):.6g} Hz "
@@ -447,7 +451,7 @@ def _energy_matrix(omega: Real, unit: Real, damping: Real, cross: Real) -> Real:
 def _invariant_planes(A: Real) -> list[Real]:
     """Orthonormal bases (2n, 2) of planes that A maps into themselves, slowest first."""
     values, vectors = sla.eig(A)
-    tiny = 1e-12 * np.abs(values).max()
+    tiny = _ROUNDED * np.abs(values).max()
     pairs = [(v.real, v.imag) for v in vectors.T[values.imag > tiny]]
     order = [abs(x) for x in values[values.imag > tiny]]
     real = np.flatnonzero(np.abs(values.imag) <= tiny)
@@ -482,7 +486,7 @@ def _growth(block: Real) -> float:
     and f = exp(mt) sin(ωt)/ω or (exp(mt) - exp(at))/(m - a) has its largest value where f' = 0.
     Without decay |R|/ω, the condition number of the eigenvectors, is sharper.
     """
-    if np.linalg.eigvalsh(0.5 * (block + block.T))[-1] <= 1e-12 * np.abs(block).max():
+    if np.linalg.eigvalsh(0.5 * (block + block.T))[-1] <= _ROUNDED * np.abs(block).max():
         return 1.0  # the length never grows
     values = np.linalg.eigvals(block)
     slow, fast = sorted(values, key=abs)
@@ -496,7 +500,7 @@ def _growth(block: Real) -> float:
     excess = abs(fast) - abs(slow)
     if not excess:
         share = 1.0
-    elif abs(slow) > 1e-16 * abs(fast):
+    elif abs(slow) > _LOST * abs(fast):
         share = abs(slow) / excess * np.log1p(excess / abs(slow))
     else:
         share = 0.0

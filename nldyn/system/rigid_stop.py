@@ -15,6 +15,7 @@ from nldyn.system.values import check_sides
 
 Restitution = Callable[[float], tuple[float, float]]
 TRIED_SPEEDS = tuple(10.0**k for k in range(-12, 4))  # m/s
+STEP, WRONG_SLOPE, DIGITS = 1e-5, 1e-3, 1e-10  # of the differences that check a law's derivative
 
 
 @dataclass(frozen=True)
@@ -141,10 +142,10 @@ def _check_restitution(owner: str, restitution: Restitution, speed: float) -> No
             )
         return e, slope
 
-    step = 1e-5 * speed
+    step = STEP * speed
     _, slope = values(speed)
     change = (values(speed + step)[0] - values(speed - step)[0]) / (2.0 * step)
-    if abs(change - slope) > 1e-3 * abs(slope) + 1e-10 / speed:
+    if abs(change - slope) > WRONG_SLOPE * abs(slope) + DIGITS / speed:
         raise SystemModelError(
             f"{owner}: restitution says {slope:g} for its derivative at {speed:g} m/s, but it "
             f"changes by {change:g}"

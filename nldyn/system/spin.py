@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LARGEST_FREQUENCY, SystemModelError, is_finite, numbers, shown
+from nldyn.system.values import SAME_ENTRY, ZERO_ENTRY
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +97,7 @@ def skew(name: str, values: ArrayLike, size: int) -> Real:
     if matrix.shape != (size, size):
         raise SystemModelError(f"{name} is {matrix.shape}, it must be {(size, size)}")
     largest = float(np.abs(matrix).max())
-    if not np.allclose(matrix, -matrix.T, rtol=1e-10, atol=1e-12 * largest):
+    if not np.allclose(matrix, -matrix.T, rtol=SAME_ENTRY, atol=ZERO_ENTRY * largest):
         raise SystemModelError(f"{name} must be skew: its transpose must be minus itself")
     return np.asarray(0.5 * (matrix - matrix.T))
 

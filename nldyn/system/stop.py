@@ -10,12 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import TINY, Real
 from nldyn.base.errors import SystemModelError, check_types, shown
 from nldyn.system.contact_law import ContactLaw, check_law, power_law
 from nldyn.system.values import check_finite, check_positive, check_sides
 
 LARGEST_EXPONENT = 4.0
+NO_LOSS = 1e-5  # 1 - restitution up to which two terms of the dissipation's series tell all digits
+SERIES = 0.1  # argument up to which y - ln(1 + y) is its series
+DIGITS = 1e-14  # relative error of a root
+CRITICAL = 1e-6  # distance of a damping ratio from 1, within which two terms of a series do
 
 
 def hertz_stiffness(
@@ -129,12 +133,12 @@ def dissipation_for(restitution: float, speed: float, *, law: str = "exact") -> 
 def _exact_loss(restitution: float) -> float:
     """Solve h(x) = h(-e x) for x = a v, with h(y) = y - ln(1 + y)."""
     lost = 1.0 - restitution
-    if lost < 1e-5:
+    if lost < NO_LOSS:
         return 1.5 * lost * (1.0 + lost)  # + O(lost^3)
 
     def root(y: float) -> float:
         """sign(y) √h(y), which is as good as linear about zero."""
-        if abs(y) < 0.1:
+        if abs(y) < SERIES:
             return y * math.sqrt(sum((-y) ** k / (k + 2) for k in range(17)))
         return math.copysign(math.sqrt(y - math.log1p(y)), y)
 
@@ -145,7 +149,7 @@ def _exact_loss(restitution: float) -> float:
     least, most = 0.375 * restitution * (1.0 - restitution**2), math.nextafter(1.0, 0.0)
     if faster(most) >= 0.0:
         return 1.0 / restitution
-    return float(brentq(faster, least, most, xtol=1e-300, rtol=1e-14)) / restitution
+    return float(brentq(faster, least, most, xtol=TINY, rtol=DIGITS)) / restitution
 
 
 def dashpot_for(restitution: float, stiffness: float, mass: float, *, pulls: bool = True) -> float:
@@ -201,7 +205,7 @@ def _ratio_without_pull(lost: float) -> float:
 
     def excess(ratio: float) -> float:
         off = 1.0 - ratio
-        if abs(off) < 1e-6:
+        if abs(off) < CRITICAL:
             share = 1.0 + off / 3.0
         elif off > 0.0:
             share = math.acos(ratio) / math.sqrt(off * (1.0 + ratio))
@@ -209,7 +213,7 @@ def _ratio_without_pull(lost: float) -> float:
             share = math.acosh(ratio) / math.sqrt(-off * (1.0 + ratio))
         return 2.0 * ratio * share - lost
 
-    return float(brentq(excess, 0.0, max(1.0, math.exp(0.5 * lost)), xtol=1e-300, rtol=1e-14))
+    return float(brentq(excess, 0.0, max(1.0, math.exp(0.5 * lost)), xtol=TINY, rtol=DIGITS))
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg as sla
 from numpy.typing import ArrayLike
 
-from nldyn.base.arrays import Complex, Real
+from nldyn.base.arrays import TINY, Complex, Real
 from nldyn.base.errors import SystemModelError, is_finite, must_be_symmetric, numbers, shown
 from nldyn.system.linear import (
     ForcedResponse,
@@ -36,11 +36,13 @@ from nldyn.system.springs_dampers import (
     bonds_of,
 )
 from nldyn.system.stop import Stop
+from nldyn.system.values import SAME_ENTRY, ZERO_ENTRY
 
 Element = TypeVar("Element")
 AnySpring = Spring | PolynomialSpring
 AnyDamper = Damper | CubicDamper
 LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
+NEGATIVE = 1e-10  # of a stiffness with a unit diagonal: an eigenvalue that is not rounding
 
 
 class Clock(NamedTuple):
@@ -892,15 +894,16 @@ def _or_zero(matrix: Real | None) -> Real:
 def _negative(K: Real) -> bool:
     """Whether a stiffness, scaled to a unit diagonal, is negative in a direction."""
     diagonal = np.abs(np.diag(K))
-    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, max(diagonal.max(), 1e-300)))
-    return bool(sla.eigvalsh(scale[:, None] * K * scale)[0] < -1e-10)
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, max(diagonal.max(), TINY)))
+    return bool(sla.eigvalsh(scale[:, None] * K * scale)[0] < -NEGATIVE)
 
 
 def _symmetric(name: str, values: ArrayLike) -> Real:
     matrix = np.atleast_2d(numbers(name, values))
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
         raise SystemModelError(f"{name} must be a square matrix, got shape {matrix.shape}")
-    if not np.allclose(matrix, matrix.T, rtol=1e-10, atol=1e-12 * float(np.abs(matrix).max())):
+    zero = ZERO_ENTRY * float(np.abs(matrix).max())
+    if not np.allclose(matrix, matrix.T, rtol=SAME_ENTRY, atol=zero):
         raise SystemModelError(f"{name} {must_be_symmetric(name)}")
     return matrix
 

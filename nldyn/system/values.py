@@ -6,6 +6,9 @@ import numpy as np
 
 from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
 
+# entries of a matrix that are meant to be equal, or both zero: relative to themselves, the largest
+SAME_ENTRY, ZERO_ENTRY = 1e-10, 1e-12
+
 
 def check_finite(owner: str, name: str, value: float) -> None:
     if not is_finite(value):

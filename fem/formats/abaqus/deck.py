@@ -16,6 +16,9 @@ from fem.formats.abaqus.types import ElementType
 
 LONGEST_RANGE = 10_000_000  # numbers, of all ranges and generations of a file together
 KINDS_OF_SETS = ("NSET", "ELSET")
+TURNED = 1e-12  # change of a direction that is more than rounding
+AT_ORIGIN = 1e-30  # m from the origin, and nearer: a place counts as that
+SAME_PLACE = 1e-9  # of the coordinates: distance of two definitions of one node
 
 Label = tuple[str, int]
 """A node or an element: the instance it is of (empty: of the deck itself), and its number."""
@@ -75,8 +78,8 @@ class Scope:
     def add_node(self, keyword: Keyword, row: int | None, label: int, place: FloatArray) -> None:
         """A new node; a number that is taken already by one at another place is an error."""
         if label in self.nodes:
-            size = max(float(np.abs(place).max()), 1e-30)
-            if float(np.abs(place - np.array(self.nodes[label])).max()) > 1e-9 * size:
+            size = max(float(np.abs(place).max()), AT_ORIGIN)
+            if float(np.abs(place - np.array(self.nodes[label])).max()) > SAME_PLACE * size:
                 raise keyword.fail(f"node {label} is defined twice, at two places", row)
             return
         self.nodes[label] = (float(place[0]), float(place[1]), float(place[2]))
@@ -100,7 +103,7 @@ class Body:
     @property
     def turned(self) -> bool:
         """Whether its directions are others than those of the whole."""
-        return bool(np.abs(self.rotation - np.eye(3)).max() > 1e-12)
+        return bool(np.abs(self.rotation - np.eye(3)).max() > TURNED)
 
     def set_of(self, kind: str, name: str) -> NamedSet | None:
         """A set by name in any case."""

@@ -17,6 +17,7 @@ from fem.mesh.attachments import Coupling, LinearEquation
 from fem.mesh.element_types import family
 
 TURNING = ("beam", "shell")
+APART = 1e-6  # of both surfaces: nodes farther apart are not joined
 Term = tuple[Label, str, float]
 
 
@@ -325,7 +326,7 @@ class Joints:
         distance, nearest = cKDTree(there).query(here)
         for slave, off, at in zip(slaves, np.asarray(distance), np.asarray(nearest), strict=True):
             master = masters[int(at)]
-            if off > 1e-6 * size:
+            if off > APART * size:
                 advice = f"surfaces whose nodes are at other places are not joined; {PARTS}"
                 self.gathered.deck.refuse("*TIE", keyword.place(row), advice)
                 return

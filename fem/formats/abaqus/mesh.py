@@ -16,6 +16,8 @@ from fem.formats.abaqus.surfaces import Surfaces
 from fem.formats.abaqus.types import ORDERS
 from fem.formats.ignored import TYPE_PREFIX
 
+OFF_FACE = 0.3  # of a cell's size: farther off, a node is not the one of its place in the row
+
 
 @dataclass
 class Cells:
@@ -172,7 +174,7 @@ def _check_centres(
     for at in (*range(20, 26), 26):
         where = _FACE_CORNERS[at - 20] if at < 26 else list(range(8))
         off = np.linalg.norm(points[nodes[:, at]] - corners[:, where].mean(axis=1), axis=1)
-        bad = np.flatnonzero(off > 0.3 * size)
+        bad = np.flatnonzero(off > OFF_FACE * size)
         if len(bad):
             label = next(k for k, v in cells.index.items() if v == ("hexahedron27", bad[0]))
             raise deck.fail(f"element {label[1]}: nodes 21 to 27 are not its centre and its faces")

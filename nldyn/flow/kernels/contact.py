@@ -70,6 +70,8 @@ NEAR_END = 1e-3  # of a panel: an event that it aims at and that happens so near
 INSTANTS, FARTHEST_END = 5.0, 1e-7  # the same of another event: in errors of its instant, at most
 MISSED = 0.01  # of the panel first tried: no event in one so short means that it is farther off,
 FARTHER = 10.0  # and the next panel is so many times longer
+SMALLEST = 1e-3  # of the largest: a penetration that is guessed where none is expected
+WITHIN = 1e-6  # of a panel: a doubtful place nearer to an end than so is that of a known switch
 
 
 @inner
@@ -347,7 +349,7 @@ def guess_panel(fl, tab, phase, w, h, h_mapped, start_switch, panel):
         if depth > 0.0:
             for i in range(tab.nodes.size):
                 later = depth + speed * length * tab.chi[kind, i]
-                delta[a, i] = max(later, 1e-3 * depth)
+                delta[a, i] = max(later, SMALLEST * depth)
         elif duration > 0.0:
             profile_guess(tab, kind, length, peak, duration, left, delta[a])
         else:
@@ -419,7 +421,7 @@ def keep_profile(fl, tab, kind, new_kind, ratio, panel, guess):
             top = max(top, guess[i])
         for i in range(guess.size):
             bond = is_bond(fl, panel.active[a])
-            panel.output[a, i] = guess[i] if bond else max(guess[i], 1e-3 * top)
+            panel.output[a, i] = guess[i] if bond else max(guess[i], SMALLEST * top)
 
 
 @inner
@@ -625,7 +627,7 @@ def contact_panel(
             fine = h <= 1.5 * graded_length(
                 fl, active, w_end, end_phase, h, -1.0, to_switch, aim if to_switch else -1
             )
-        if 1e-6 < doubtful < 1.0 - 1e-6 and not looked:  # the state at the end of a panel is exact
+        if WITHIN < doubtful < 1.0 - WITHIN and not looked:  # the state at a panel's end is exact
             looked = True
             keep_profile(fl, tab, kind, smooth, doubtful, panel, guess)
             kind, aim = smooth, -1

@@ -27,6 +27,7 @@ SHALLOW = 16.0  # a lowest point less than so a part of the curvature high all b
 DAMPED_TAIL = 0.01  # of the usual one, where a stop damps strongly
 REACH = 0.05  # of the interval: where the next parabola's places lie beside its lowest point
 CLEAR = 0.1  # of the largest: a lowest value above it is not near zero between the places either
+PLACED = 1e-6  # relative: error of the place where a panel is to be cut
 
 
 @inner
@@ -314,7 +315,7 @@ def first_root(tab, values, fine, noise, edge):
                 low, above = middle, value
             else:
                 high, under = middle, value
-            if high - low <= 1e-6 * high or value == 0.0:
+            if high - low <= PLACED * high or value == 0.0:
                 break
         return high
     return 2.0

@@ -32,6 +32,7 @@ SHUT = 10.0  # roundings of a gap that is shut, and of a rate that is none
 AT_START = 1e5  # the same at the start of a segment, whose state is known less well
 SLOW = 1e-7  # share of the first speed below which impacts of one instant are no longer told apart
 LOW = 10.0  # a body that would rebound no higher than this many roundings of the gap stays
+AT_ONCE = 1e-3  # rad of the excitation, within which a body that pushes off hits again
 
 
 @allocating
@@ -310,6 +311,6 @@ def departure(fl, stop, w, phase, shortest):
         if value - fl.stops[stop, GAP] < -noise and speed < 0.0:
             return t
         t *= 2.0
-        if fl.omega * t > 1e-3:
+        if fl.omega * t > AT_ONCE:
             break
     return shortest
