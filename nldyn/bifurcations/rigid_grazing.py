@@ -16,13 +16,10 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.bifurcations.normal_form_coefficients import CoefficientError
-from nldyn.flow.flow_map import Segments
+from nldyn.bifurcations.rigid_touch import Touch
 from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit
-from nldyn.orbits.passage import shoot_past
-from nldyn.system.rigid_stop import RigidStop
 
-BESIDE = 1e-4  # forcing phase in rad between speeds whose difference is the deceleration
 SLIGHT = 1e-12  # speed in m/s at which restitution is that of the slightest impact
 FORGOTTEN = 1e-6  # share of a kick that is none
 MOST_PERIODS = 1000  # in which it is looked for
@@ -67,30 +64,15 @@ def rigid_grazing_form(orbit: Orbit, grazing: Grazing) -> RigidGrazing:
     ConvergenceError, SystemModelError
         The same.
     """
-    stop, touched = grazing.stop, orbit.system.stops[grazing.stop]
-    assert isinstance(touched, RigidStop)
-    problem, omega = orbit.problem, orbit.omega
-    flow, full = problem.flow, 2.0 * math.pi * orbit.period
-    passage = grazing.passage
-
-    def shoot(state: Real, first: float, last: float) -> Segments:
-        return shoot_past(problem, passage, state[None], np.array([first, last]), omega, True)
-
-    nodes, phases = problem.nodes(orbit.point), problem.phases
-    phase = (grazing.phase - problem.start) % full + problem.start
-    j = min(int(np.searchsorted(phases, phase, side="right")) - 1, problem.segments - 1)
-    node = nodes[j]
-    state = shoot(node, float(phases[j]), phase).ends[0] if phase > phases[j] else node
-    around = shoot(state, phase, phase + full)
-    row, rate = flow.rows[stop], flow.rate_rows[stop]
-    near, far = (rate @ shoot(state, phase, phase + x).ends[0] for x in (BESIDE, 2.0 * BESIDE))
-    deceleration = 0.5 * (3.0 * (rate @ state) - 4.0 * near + far) * omega / BESIDE
-    jacobian = around.jacobians[0]
-    kick = flow.force_columns[:, stop]
-    kick = kick / (rate @ kick)
+    touch = Touch.of(orbit, grazing)
+    state, phase, omega, kick = touch.state, touch.phase, touch.omega, touch.kick
+    flow = orbit.problem.flow
+    row, rate = flow.rows[grazing.stop], flow.rate_rows[grazing.stop]
+    around = touch.shoot(state, phase, phase + 2.0 * math.pi * orbit.period)
+    jacobian, deceleration = around.jacobians[0], -omega * float(rate @ touch.rate(state, phase))
     if not deceleration > 0.0:
         raise CoefficientError("the motion does not turn at the stop")
-    loss = 1.0 + touched.restitution_at(SLIGHT)
+    loss = touch.loss(SLIGHT)
     ways = np.linalg.solve(np.eye(len(row)) - jacobian, np.column_stack(
         [jacobian @ kick, omega * around.d_omega[0]]
     ))  # fmt: skip

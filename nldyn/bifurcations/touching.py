@@ -11,11 +11,13 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError
 from nldyn.bifurcations.point import BranchNode
+from nldyn.orbits.bordered import length_unit
 from nldyn.orbits.extremes import alone, nearest, sign_changes
 from nldyn.orbits.orbit import Extremes, Orbit
 from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.system import System
 
+EXACT = 1e-9  # of an orbit's size: depth of a touch that is solved for
 SMOOTH_TOUCH = 1.5  # exponent of a stop from which on multipliers have a slope at a touch
 
 
@@ -84,14 +86,24 @@ def rigid_grazing(
     The depth of an impact is its speed over ω. Those of which `but` (stop, phase) says so are left
     out.
     """
-    found = [
+    found = [each for each in rigid_touches(orbit) if but is None or not but(*each[:2])]
+    return min(found, key=lambda entry: abs(entry[2]), default=None)
+
+
+def rigid_touches(orbit: Orbit) -> list[tuple[int, float, float]]:
+    """Rigid stop, phase and depth (in m) of all impacts and near misses."""
+    return [
         (stop, float(phase), float(depth))
         for stop, each in enumerate(orbit.system.stops)
         if isinstance(each, RigidStop)
         for phase, depth in zip(*_maxima(orbit.touches(stop)), strict=True)
-        if but is None or not but(stop, float(phase))
     ]
-    return min(found, key=lambda entry: abs(entry[2]), default=None)
+
+
+def grazes_exactly(orbit: Orbit) -> bool:
+    """Whether an orbit grazes a rigid stop, as one that was solved for does."""
+    found = rigid_grazing(orbit)
+    return found is not None and abs(found[2]) < EXACT * length_unit(orbit)
 
 
 def _maxima(found: Extremes) -> tuple[Real, Real]:

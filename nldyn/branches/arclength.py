@@ -23,13 +23,14 @@ from nldyn.bifurcations.branch_crossing import (
 from nldyn.bifurcations.period_doubling import flip_between, half_difference, passed_flip
 from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.sign_changes import crosses
-from nldyn.bifurcations.touching import rigid_grazing
+from nldyn.bifurcations.touching import rigid_grazing, rigid_touches
+from nldyn.bifurcations.within_step import passes_node
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.predictor import predicted
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.bordered import Free, OrbitFamily, correct, length_unit
 from nldyn.orbits.conditions import TOUCH, depth_row
-from nldyn.orbits.impact_phases import nodes_to_impacts, start_far_from_impacts
+from nldyn.orbits.impact_phases import impact_behind_node, start_far_from_impacts
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import FROM_NEAR, ShootingProblem, asymmetry, metric_length, shifts
 from nldyn.system.chart import FREQUENCY, Chart
@@ -46,7 +47,7 @@ GRAZES = 1e-4  # depth over size at which a walk that cannot go on is at a grazi
 SLIGHTEST = 1e-6  # impact with one that is followed: multipliers go with its inverse
 NEAR_NODE = 1e-4  # phase from an impact to one of shooting from which a walk may pass it
 AT_NODE = 1e-7  # the same that is too near
-PAST_NODE = 1e-6, 1e-5, 1e-4, 1e-3  # relative steps of the frequency over it
+PAST_NODE = 1e-6, 1e-5, 1e-4, 1e-3  # steps over it
 MOST_BEHIND = 4  # points behind the last one that tell where a branch goes on
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
@@ -105,6 +106,17 @@ def loses_impact(orbit: Orbit) -> bool:
     return bool(found.failure) or int(found.closings.sum()) != orbit.impacts
 
 
+def grazing_between(a: Orbit, b: Orbit) -> bool:
+    """Whether two neighbouring orbits without rest differ by impacts with rigid stops.
+
+    Between them lies a grazing, where a branch has a corner, and may turn back.
+    """
+    if a.rests or b.rests:
+        return False
+    first, last = (sum(depth > 0.0 for *_, depth in rigid_touches(orbit)) for orbit in (a, b))
+    return first != last
+
+
 def _past_impact_at_node(here: BranchNode) -> tuple[BranchNode, float, float] | None:
     """Next point where the phase of an impact with a rigid stop passes one of shooting, or None.
 
@@ -112,7 +124,8 @@ def _past_impact_at_node(here: BranchNode) -> tuple[BranchNode, float, float] | 
     solved for by its states at other phases.
     """
     orbit, problem = here.orbit, here.orbit.problem
-    if nodes_to_impacts(orbit) > NEAR_NODE:
+    before = impact_behind_node(orbit)
+    if abs(before) > NEAR_NODE:
         return None
     hz = orbit.frequency_hz
     chart = Chart(Parameter(FREQUENCY), 0.5 * hz, 2.0 * hz)
@@ -122,9 +135,12 @@ def _past_impact_at_node(here: BranchNode) -> tuple[BranchNode, float, float] | 
     try:
         guess = family.unknowns(orbit)
         for shift in PAST_NODE:
-            guess[-1] = chart.coordinate(hz * math.exp(shift * by_frequency[-1]))
+            guess[-1] = chart.coordinate(hz * math.exp(shift * float(here.tangent[-1])))
             met = correct(family, guess, Free(), np.abs(by_frequency), float(guess[-1]))
-            if not met.converged or nodes_to_impacts(met.orbit) < AT_NODE:
+            if not met.converged:
+                continue
+            behind = impact_behind_node(met.orbit)
+            if abs(behind) < AT_NODE or (abs(before) > AT_NODE and before * behind > 0.0):
                 continue
             found = problem.correct(
                 met.orbit.point, by_frequency, longest=NEAR_NODE, max_iterations=FROM_NEAR
@@ -190,9 +206,7 @@ class Stepper:
             attempt = self._shortened(problem, behind, here, step)
             if attempt is None:
                 grazes = grazes_rigid(here.orbit, -GRAZES, GRAZES)
-                self.stop_reason = grazes or Ending.SHORT_STEP.told(
-                    step=f"{self.options.min_step:g}", obstacle=self._obstacle
-                )
+                self.stop_reason = grazes or self.too_short()
                 return
             step, point, angle, miss = attempt
             low, high = self.range_hz
@@ -219,7 +233,6 @@ class Stepper:
             grazes = grazes_rigid(point.orbit, 0.0, SLIGHTEST)
             if grazes:
                 self.stop_reason = grazes
-                yield point
                 return
             if self.closes(here, point):
                 self.stop_reason = Ending.CLOSED_BRANCH.told()
@@ -242,6 +255,17 @@ class Stepper:
             self.visited.append(point)
             yield point
         self.stop_reason = Ending.MOST_POINTS.told(points=self.options.max_points)
+
+    def too_short(self) -> StopReason:
+        """The reason to stop where no step leads on."""
+        return Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
+
+    def begin_anew(self, here: BranchNode, step: float) -> None:
+        """Go on from a point behind a corner of the branch; the points before it do not count."""
+        assert self.stride is not None
+        behind = np.empty((0, here.tangent.size))
+        self.stride = StepperState(here, step, behind, self.stride.count + 1)
+        self.visited.append(here)
 
     def _shortened(
         self, problem: ShootingProblem, behind: Real, here: BranchNode, step: float
@@ -305,7 +329,7 @@ class Stepper:
         if _jumped(problem, here.orbit.point, straight, found.point):
             return None
         orbit = Orbit.of(problem, found, here.orbit.observe)
-        if loses_impact(orbit):
+        if loses_impact(orbit) or grazing_between(here.orbit, orbit):
             return None
         miss = metric_length(weights, found.point - cubic) / step
         # a linear stop that is touched bends the branch; a force that jumps does where the phase of
@@ -489,7 +513,12 @@ def _crossing_ahead(here: BranchNode) -> BranchNode | None:
 
 
 def _passed(a: BranchNode, b: BranchNode, places: Real) -> NDArray[np.bool_]:
-    """Which places (m, N + 1) lie beside the step from a to b, nearer than 0.1 of its length."""
+    """Which places (m, N + 1) lie beside the step from a to b, nearer than 0.1 of its length.
+
+    None do where an impact passes a phase of shooting: the state jumps there.
+    """
+    if passes_node(a, b):
+        return np.zeros(len(places), dtype=bool)
     start, step = a.orbit.point, b.orbit.point - a.orbit.point
     weights = a.orbit.problem.metric(start)
     length2 = float(step @ (weights * step))

@@ -11,16 +11,18 @@ from operator import attrgetter
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, LocateError
+from nldyn.bifurcations.beyond_rigid_grazing import beyond_rigid_grazing
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossing, without_repeats
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
-from nldyn.bifurcations.touching import rigid_grazing
+from nldyn.bifurcations.touching import grazes_exactly, rigid_grazing
 from nldyn.bifurcations.within_step import insert_dip, special_points_between
 from nldyn.branches.arclength import Stepper, StepperState
 from nldyn.branches.branch import WalkEnd
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.conditions import nearest_grazing
+from nldyn.orbits.orbit import same_orbit
 from nldyn.orbits.shooting import metric_length
 
 AT_FLIP = 1e-5  # distance of a turn of a doubled branch from its end that may be the flip itself
@@ -76,7 +78,8 @@ class LegBuilder:
     notes: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._searched = max(len(self.nodes) - 2, 0)
+        self._piece = self._begin_of_piece()  # first node behind the last rigid grazing
+        self._searched = max(len(self.nodes) - 2, self._piece)
         self._mark = self._here() if self.nodes else None
 
     @classmethod
@@ -116,24 +119,13 @@ class LegBuilder:
         keep : callable, optional
             Called after every point, when `so_far` tells of it.
         """
-        for point in self.walk:
-            self.nodes.append(point)
+        while True:
+            self._follow(progress, keep)
+            if not self._passes_grazing():
+                break
             if progress is not None:
-                progress(point.orbit.frequency_hz)
-            if len(self.nodes) > 2:
-                insert_dip(self.nodes, len(self.nodes) - 2)
-            regular = self.walk.stride is not None and self.walk.stride.here is point
-            self._search(len(self.nodes) - 2, closely=regular)
-            if regular:
-                self._mark = self._here()
-                if keep is not None:
-                    keep()
-        self._search(len(self.nodes) - 1, closely=False)
+                progress(self.nodes[-1].orbit.frequency_hz)
         ending = self.walk.stop_reason.ending
-        if ending is Ending.GRAZES_RIGID:
-            grazing = _grazing_at_end(self.nodes)
-            self.special_points.append(grazing)
-            self.walk.stop_reason = Ending.GRAZES_RIGID.told(hz=f"{grazing.frequency_hz:.9g}")
         if ending is Ending.COMES_BACK:
             self.notes.append(self.walk.stop_reason)
         special = self.special_points
@@ -146,6 +138,49 @@ class LegBuilder:
         end = self._end(next(i for i, p in enumerate(self.nodes) if p is self._stride.here))
         notes = [*self.notes, *not_told_apart(special)]
         return Leg(self.nodes, special, notes, self.walk.stop_reason, end)
+
+    def _follow(
+        self, progress: Callable[[float], None] | None, keep: Callable[[], None] | None
+    ) -> None:
+        """Walk until the walk ends, and search all that it has passed."""
+        for point in self.walk:
+            self.nodes.append(point)
+            if progress is not None:
+                progress(point.orbit.frequency_hz)
+            if len(self.nodes) - self._piece > 2:
+                insert_dip(self.nodes, len(self.nodes) - 2)
+            regular = self.walk.stride is not None and self.walk.stride.here is point
+            self._search(len(self.nodes) - 2, closely=regular)
+            if regular:
+                self._mark = self._here()
+                if keep is not None:
+                    keep()
+        self._search(len(self.nodes) - 1, closely=False)
+
+    def _passes_grazing(self) -> bool:
+        """Whether the walk has ended where a rigid stop is grazed, and goes on behind that.
+
+        Either way the grazing is a special point.
+        """
+        walk, last = self.walk, self.nodes[-1]
+        if walk.stop_reason.ending is not Ending.GRAZES_RIGID:
+            return False
+        grazing = _grazing_at_end(self.nodes)
+        if self._piece and same_orbit(grazing.orbit, self.special_points[-1].orbit):
+            walk.stop_reason = walk.too_short()
+            return False
+        self.special_points.append(grazing)
+        beyond = None
+        if grazing.orbit is not last.orbit:
+            beyond = beyond_rigid_grazing(grazing.point, last.orbit)
+        if beyond is None:
+            walk.stop_reason = Ending.GRAZES_RIGID.told(hz=f"{grazing.frequency_hz:.9g}")
+            return False
+        walk.begin_anew(beyond, beyond.arclength - grazing.point.arclength)
+        self.nodes.append(beyond)
+        self._piece = self._searched = len(self.nodes) - 1
+        self._mark = self._here()
+        return True
 
     def _once_around(self) -> list[SpecialPoint]:
         """The special points of a closed branch, whose last step leads beyond the start.
@@ -176,6 +211,15 @@ class LegBuilder:
             Ending.NOT_FINISHED.told(),
             self._end(kept),
         )
+
+    def _begin_of_piece(self) -> int:
+        """Number of the first node behind the last grazing of a rigid stop that was passed."""
+        passed = [
+            special.point.arclength
+            for special in self.special_points
+            if special.kind == "GR" and grazes_exactly(special.orbit)
+        ]
+        return bisect(self.nodes, passed[-1], key=attrgetter("arclength")) if passed else 0
 
     def _is_flip_at_end(self, special: SpecialPoint) -> bool:
         """Whether a turn of a doubled branch is where it joins the one that it comes from."""
@@ -234,7 +278,7 @@ class LegBuilder:
         ahead = len(self.nodes) - pairs  # nodes that stay beyond those searched
         while self._searched < len(self.nodes) - ahead:
             a, b = self.nodes[self._searched : self._searched + 2]
-            before = self.nodes[self._searched - 1] if self._searched else None
+            before = self.nodes[self._searched - 1] if self._searched > self._piece else None
             after = next(iter(self.nodes[self._searched + 2 :]), None)
             try:
                 self.special_points += special_points_between(a, b, before, after)
@@ -279,7 +323,9 @@ def _grazing_at_end(nodes: Sequence[BranchNode]) -> SpecialPoint:
     last = nodes[-1]
     exact = nearest_grazing(last.orbit)
     if exact is not None:
-        return SpecialPoint("GR", replace(last, orbit=exact, tests={}), exact.error)
+        weights = exact.problem.metric(exact.point)
+        length = last.arclength + metric_length(weights, exact.point - last.orbit.point)
+        return SpecialPoint("GR", BranchNode(exact, last.tangent, length), exact.error)
     error = last.orbit.error
     here = rigid_grazing(last.orbit)
     before = rigid_grazing(nodes[-2].orbit) if len(nodes) > 1 else None

@@ -22,19 +22,27 @@ def _impact_phases(orbit: Orbit) -> Real:
 
 
 def _to_nodes(phases: Real, start: float, orbit: Orbit) -> float:
-    """Least distance of phases from those of shooting that begins at one."""
+    """Least distance of phases from those of shooting that begins at one, positive behind it."""
     length = 2.0 * math.pi * orbit.period / orbit.problem.segments
-    apart = np.abs((phases - start + 0.5 * length) % length - 0.5 * length)
-    return float(apart.min(initial=math.inf))
+    apart = (phases - start + 0.5 * length) % length - 0.5 * length
+    return float(min(apart, key=abs, default=math.inf))
+
+
+def impact_behind_node(orbit: Orbit) -> float:
+    """Phase in rad of the impact with a rigid stop that is nearest to a phase of shooting, from it.
+
+    Negative for one that lies before; infinite without impacts.
+    """
+    return _to_nodes(_impact_phases(orbit), 0.0, orbit)
 
 
 def nodes_to_impacts(orbit: Orbit) -> float:
     """Least distance in rad of impacts with rigid stops from phases of shooting."""
-    return _to_nodes(_impact_phases(orbit), 0.0, orbit)
+    return abs(impact_behind_node(orbit))
 
 
 def start_far_from_impacts(orbit: Orbit) -> float:
     """A first phase of shooting that keeps all of them far from impacts."""
     phases, length = _impact_phases(orbit), 2.0 * math.pi * orbit.period / orbit.problem.segments
     starts = length * np.arange(1, STARTS) / STARTS
-    return float(max(starts, key=lambda start: _to_nodes(phases, start, orbit)))
+    return float(max(starts, key=lambda start: abs(_to_nodes(phases, start, orbit))))

@@ -91,9 +91,12 @@ def shoot_past(
     omega: float,
     sensitivities: bool,
     parameters: Sequence[Parameter] = (),
+    size: float = 0.0,
 ) -> Segments:
     """What `FlowMap.shoot` gives for states (k, 2n) at phases (k + 1,), past a stop if there is a
     passage.
+
+    The stop left out is out of reach of states of their size, or of `size` if that is larger.
 
     Raises
     ------
@@ -103,7 +106,7 @@ def shoot_past(
     flow = problem.flow
     if passage is None:
         return _shot(flow, nodes, phases, omega, sensitivities, parameters)
-    open_flow = passage.opened(flow, float(np.abs(nodes).max()))
+    open_flow = passage.opened(flow, max(size, float(np.abs(nodes).max())))
     found = []
     for node, first, last in zip(nodes, phases[:-1].tolist(), phases[1:].tolist(), strict=True):
         cuts, within = passage.cuts(first, last)

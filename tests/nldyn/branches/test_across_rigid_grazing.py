@@ -1,0 +1,90 @@
+"""Branches that go on where they graze a rigid stop, against closed forms of one impact."""
+
+import math
+
+import numpy as np
+import pytest
+from one_impact import OneImpact
+
+from nldyn import HarmonicForce, RigidStop, System, continue_branch, impacts, solve_orbit
+from nldyn.branches.endings import Ending
+
+GAP, RESTITUTION = 0.3, 0.8
+TURN = 2.0 * math.pi
+TWO = np.eye(2), np.array([[2.0, -1.0], [-1.0, 3.0]]), np.array([[0.1, -0.05], [-0.05, 0.15]])
+# matrices, force, calm start, range; whether both orbits exist on the same side
+ACROSS = {
+    "in its place": (([[1.0]], [[1.0]], [[0.1]]), [1.0], 0.45, (0.25, 0.5), False),
+    "overdamped": (([[1.0]], [[1.0]], [[2.5]]), [1.0], 0.3, (0.15, 0.35), False),
+    "beside it": (TWO, [1.0, 0.3], 0.5, (0.36, 0.55), True),
+}
+
+
+def system_of(matrices, force, stops):
+    mass, stiffness, damping = matrices
+    rows = np.eye(len(force))
+    return System.from_matrices(
+        mass, stiffness, {f"x{i}": row for i, row in enumerate(rows)}, damping=damping,
+        stops=stops, excitation=[HarmonicForce(f"x{i}", f) for i, f in enumerate(force)],
+    )  # fmt: skip
+
+
+def across(name):
+    matrices, force, hz, range_hz, _ = ACROSS[name]
+    system = system_of(matrices, force, [RigidStop("x0", RESTITUTION, GAP)])
+    return continue_branch(solve_orbit(system, hz), range_hz)
+
+
+@pytest.mark.parametrize("name", ACROSS)
+def test_the_calm_branch_goes_on_with_the_slight_impact(name):
+    """Down to a speed of 1e-5 of the orbit's, each orbit is that of the closed form."""
+    matrices, force, _, _, folds = ACROSS[name]
+    branch = across(name)
+    shape = OneImpact(*matrices, force, np.eye(len(force))[0], GAP, RESTITUTION)
+    touch = next(special for special in branch.special_points if special.orbit.impacts == 0)
+    assert abs(shape.response(touch.orbit.omega)[0]) == pytest.approx(GAP, rel=1e-10)
+    hit = [orbit for orbit in branch.points if orbit.impacts == 1]
+    calm = [orbit for orbit in branch.points if orbit.impacts == 0]
+    assert min(impacts(orbit).speed[0] for orbit in hit) < 1e-4 * GAP * touch.orbit.omega
+    near = min(hit, key=lambda orbit: abs(orbit.frequency_hz - touch.frequency_hz))
+    assert (near.frequency_hz > touch.frequency_hz) == folds
+    assert min(orbit.frequency_hz for orbit in calm) > touch.frequency_hz
+    for orbit in hit:
+        speed = impacts(orbit).speed[0]
+        exact = [motion.speed for motion in shape.motions(orbit.omega, 1)]
+        # the height that the motion would reach goes with v², and v with the root of it
+        fastest = orbit.max_abs_displacement * orbit.omega
+        assert min(abs(speed**2 - v**2) for v in exact) < 1e-10 * fastest**2
+
+
+@pytest.mark.parametrize("name", ACROSS)
+def test_from_either_side_the_branch_is_the_same(name):
+    branch = across(name)
+    hit = next(orbit for orbit in branch.points if orbit.impacts == 1)
+    again = continue_branch(hit, branch.course.range_hz)
+    told, found = (
+        sorted((special.kind, special.frequency_hz) for special in b.special_points)
+        for b in (branch, again)
+    )
+    assert [kind for kind, _ in found] == [kind for kind, _ in told]
+    assert [hz for _, hz in found] == pytest.approx([hz for _, hz in told], rel=1e-9)
+
+
+def test_a_branch_that_has_crossed_a_grazing_is_extended_to_the_same_digits():
+    matrices, force, hz, (low, high), _ = ACROSS["in its place"]
+    system = system_of(matrices, force, [RigidStop("x0", RESTITUTION, GAP)])
+    orbit = solve_orbit(system, hz)
+    longer = continue_branch(continue_branch(orbit, (0.33, high)), (low, high))
+    whole = continue_branch(orbit, (low, high))
+    assert longer.frequency_hz.tolist() == whole.frequency_hz.tolist()
+    assert [s.kind for s in longer.special_points] == [s.kind for s in whole.special_points]
+
+
+def test_two_stops_grazed_at_once_end_a_branch():
+    """A symmetric motion between two stops: what lies behind is not looked for."""
+    stops = [RigidStop("x0", RESTITUTION, GAP, direction=side) for side in (1, -1)]
+    branch = continue_branch(
+        solve_orbit(system_of(([[1.0]], [[1.0]], [[0.1]]), [1.0], stops), 0.45), (0.25, 0.5)
+    )
+    assert branch.stop_reasons[0].ending is Ending.GRAZES_RIGID
+    assert branch.special_points[0].kind == "GR"
