@@ -278,15 +278,7 @@ def coupled_dually(components: Mapping[str, ReducedModel], joints: Sequence[Join
     rest = beside(answer, (P[unjoined(assembly, joints)] / squares).T, squares)
     k, g, j = len(kept), rest.shape[1], len(joints)
     series = np.diag([0.0 if x.stiffness is None else 1.0 / x.stiffness for x in joints])
-    K, M = np.zeros((k + g + j,) * 2), np.eye(k + g + j)
-    K[:k, :k] = np.diag(assembly.omega[kept] ** 2)
-    K[k : k + g, k : k + g] = rest.T @ (squares[:, None] * rest)
-    K[:k, k + g :], K[k + g :, :k] = -A.T, -A
-    K[k + g :, k + g :] = -(answer.T @ (squares[:, None] * answer) + series)
-    M[k : k + g, k : k + g] = rest.T @ rest
-    M[k : k + g, k + g :] = rest.T @ answer
-    M[k + g :, k : k + g] = M[k : k + g, k + g :].T
-    M[k + g :, k + g :] = answer.T @ answer
+    K, M = dual_matrices(assembly.omega[kept] ** 2, squares, rest, answer, A, series)
     turn = np.zeros((assembly.omega.size, k + g + j))
     turn[kept, :k] = np.eye(k)
     turn[attached, k : k + g] = rest
@@ -313,6 +305,40 @@ def coupled_dually(components: Mapping[str, ReducedModel], joints: Sequence[Join
         shapes=all_shapes[:, spurious] @ lost.T,
         method=DUAL,
     )
+
+
+def dual_matrices(
+    kept: FloatArray,
+    squares: FloatArray,
+    rest: FloatArray,
+    answer: FloatArray,
+    A: FloatArray,
+    series: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """K and M for coordinates of the kept modes (k) and of the rest (g), and joints' forces (j).
+
+    Parameters
+    ----------
+    kept, squares
+        ω² of the kept modes (k,) and of the residual ones (n,).
+    rest, answer
+        Shapes in the residual modes: independent ones (n, g), and the answers to the forces (n, j).
+    A
+        Openings of the joints by the kept modes (j, k).
+    series
+        Flexibilities of the joints (j, j).
+    """
+    k, g, j = len(kept), rest.shape[1], len(A)
+    K, M = np.zeros((k + g + j,) * 2), np.eye(k + g + j)
+    K[:k, :k] = np.diag(kept)
+    K[k : k + g, k : k + g] = rest.T @ (squares[:, None] * rest)
+    K[:k, k + g :], K[k + g :, :k] = -A.T, -A
+    K[k + g :, k + g :] = -(answer.T @ (squares[:, None] * answer) + series)
+    M[k : k + g, k : k + g] = rest.T @ rest
+    M[k : k + g, k + g :] = rest.T @ answer
+    M[k + g :, k : k + g] = M[k : k + g, k + g :].T
+    M[k + g :, k + g :] = answer.T @ answer
+    return K, M
 
 
 def unjoined(assembly: Assembly, joints: Sequence[Joint]) -> list[int]:

@@ -16,7 +16,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -333,8 +333,6 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
     compiles nothing and takes a second or two.
     """
     with plain_errors():
-        import cms
-        import fem
         from nldyn.base.errors import SystemModelError
         from nldyn.runtime.progress import messages_shown
         from nldyn.scene.build import (
@@ -386,13 +384,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
                 }
             )
             return
-        for name, part in parts.items():
-            if name:
-                click.echo(f"component '{name}':")
-            if isinstance(part, cms.Matrices):
-                click.echo(f"matrices of {part.mass.shape[0]} degrees of freedom")
-            else:
-                click.echo(fem.summary(part))
+        echo_parts(parts)
         described = describe_system(system, 0 if reduced is None else reduced.residual_modes)
         click.echo("\n".join([described, *at_rest]))
         check_computable(loaded, scene)
@@ -404,6 +396,20 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
         for remark in remarks(loaded, float(system.frequencies_hz.max())):
             click.echo(f"note: {remark}")
         click.echo(f"{scene}: no fault found")
+
+
+def echo_parts(parts: Mapping[str, Any]) -> None:
+    """What was read of each component of a scene."""
+    import cms
+    import fem
+
+    for name, part in parts.items():
+        if name:
+            click.echo(f"component '{name}':")
+        if isinstance(part, cms.Matrices):
+            click.echo(f"matrices of {part.mass.shape[0]} degrees of freedom")
+        else:
+            click.echo(fem.summary(part))
 
 
 @main.command()

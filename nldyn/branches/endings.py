@@ -99,7 +99,6 @@ class StopReason(str):
 
 
 StopReasons = tuple[StopReason, StopReason]
-AT_RANGE_END = (Ending.PARAMETER_RANGE_END, Ending.NO_ORBIT_AT_RANGE_END)
 
 
 def has_ending(reasons: StopReasons, ending: Ending) -> bool:

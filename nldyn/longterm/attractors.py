@@ -361,19 +361,24 @@ def attractor_from(
         return Attractor(flow, frequency_hz, "failed", state[None], failure=str(error))
     if found is not None:
         return _periodic(flow, frequency_hz, *found, chaos)
-    kind: Kind = "undecided"
-    again = 0
-    if exponents.chaotic:
-        kind, chaos = "chaotic", chaos[:-1]
-    elif _drifts(flow, cloud):
-        kind = "drifting"
-    elif exponents.vanishing:
-        again = _repeats(end, options.max_period)
-        kind = "undecided" if again else "quasi-periodic"
+    kind, again = _kind_without_orbit(flow, exponents, cloud, end, options.max_period)
     return Attractor(
         flow, frequency_hz, kind, cloud, exponents=exponents, zero_one=zero_one_test(cloud[:, 0]),
-        chaotic_runs=tuple(chaos), settling=settling, returns_after=again,
+        chaotic_runs=tuple(chaos[:-1] if exponents.chaotic else chaos), settling=settling,
+        returns_after=again,
     )  # fmt: skip
+
+
+def _kind_without_orbit(
+    flow: FlowMap, exponents: LyapunovSpectrum, cloud: Real, end: Real, max_period: int
+) -> tuple[Kind, int]:
+    """Kind of a motion that reaches no orbit, and the periods after which it returns, or 0."""
+    if exponents.chaotic:
+        return "chaotic", 0
+    if _drifts(flow, cloud):
+        return "drifting", 0
+    again = _repeats(end, max_period) if exponents.vanishing else 0
+    return ("quasi-periodic" if exponents.vanishing and not again else "undecided"), again
 
 
 def _periodic(

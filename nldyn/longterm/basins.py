@@ -560,20 +560,11 @@ def basins(
     failed = Counter({s.attractor.failure: s.count for s in shares if s.attractor.failure})
     notes = _told(failed, len(picked), "simulations that look for attractors")
     ends = _Ends.of(flow.to_state(modal))
-    order = rng.permutation(len(modal))  # so that all computations take about as long
-    left, done = order, 0
-    while len(left) and done < len(known):
-        targets = [target_of(attractor) for attractor in known]
-        stage = count.stage(len(left), more=0 if len(left) == cells else len(left))
-        ends.settle(left, partial(settle, flow, omega, targets, longest), executor, stage)
-        done = len(known)
-        left = order[ends.labels[order] == UNDECIDED]
-        new = partial(attractor_from, flow, frequency_hz, name, options)
-        more = MOTION * len(left[:starts])
-        stage = count.stage(more, more=more)
-        for attractor in values_of(new, list(ends.states[left[:starts]]), executor, stage):
-            _add(known, attractor)
-    checked = rng.choice(len(modal), min(checks, len(modal)), replace=False)
+    order = rng.permutation(cells)  # so that all computations take about as long
+    new = partial(attractor_from, flow, frequency_hz, name, options)
+    enter = partial(settle, flow, omega)
+    _follow_cells(ends, order, known, enter, longest, new, starts, executor, count)
+    checked = rng.choice(cells, min(checks, cells), replace=False)
     again = partial(_index_of, flow, frequency_hz, name, options, known)
     stage = count.stage(MOTION * len(checked))
     results = values_of(again, [flow.to_state(modal[cell]) for cell in checked], executor, stage)
@@ -592,6 +583,31 @@ def basins(
         int(wrong),
         tuple(notes),
     )
+
+
+def _follow_cells(
+    ends: _Ends,
+    order: NDArray[np.intp],
+    known: list[Attractor],
+    enter: Callable[[list[Target], int, Real], Settled],
+    longest: int,
+    new: Callable[[Real], Attractor],
+    starts: int,
+    executor: Executor | None,
+    count: _Count,
+) -> None:
+    """Follow cells to the attractors that are known; what is left may lead to others."""
+    left, done = order, 0
+    while len(left) and done < len(known):
+        targets = [target_of(attractor) for attractor in known]
+        stage = count.stage(len(left), more=0 if len(left) == len(order) else len(left))
+        ends.settle(left, partial(enter, targets, longest), executor, stage)
+        done = len(known)
+        left = order[ends.labels[order] == UNDECIDED]
+        more = MOTION * len(left[:starts])
+        stage = count.stage(more, more=more)
+        for attractor in values_of(new, list(ends.states[left[:starts]]), executor, stage):
+            _add(known, attractor)
 
 
 @dataclass

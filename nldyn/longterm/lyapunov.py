@@ -82,11 +82,6 @@ class LyapunovSpectrum:
         return float(self.errors[0])
 
     @property
-    def per_period(self) -> Real:
-        """Exponents per excitation period, (2n,)."""
-        return self.exponents / self.frequency_hz
-
-    @property
     def sum_error(self) -> float:
         """How far the sum is from the divergence, relative to it (or to 1/s where that is less)."""
         return abs(float(self.exponents.sum()) - self.divergence) / max(abs(self.divergence), 1.0)

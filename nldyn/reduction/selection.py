@@ -14,7 +14,7 @@ from nldyn.branches.branch import Branch
 from nldyn.branches.peaks import resonance_peaks
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
-from nldyn.reduction.candidates import BEYOND, candidate_modes, share
+from nldyn.reduction.candidates import BEYOND, Candidates, candidate_modes, share
 from nldyn.reduction.convergence import (
     harmonic_branch,
     largest_force,
@@ -198,24 +198,8 @@ def select_modes(
     reference = cms.keep_modes(whole, seen)
     judge = Judge(setting, reference, harmonic_branch(setting.system(reference), setting, tell))
     candidates = visible.numbers
-    rigid = [n for n in candidates if whole.frequencies_hz[n - 1] == 0.0]
-    kept, error = list(rigid), math.inf if len(seen) > len(rigid) else 0.0
     shares.end("reference")
-    choose = shares.part("modes")
-    for number in [n for n in seen if n not in rigid]:
-        kept.append(number)
-        choose(f"mode {number}", 0.0, 0.5 * len(kept) / len(seen))
-        error = judge.error(cms.keep_modes(whole, kept))
-        if error <= tolerance:
-            break
-    for tried, number in enumerate(sorted(kept, key=lambda n: share(whole, setting, n))):
-        fewer = [n for n in kept if n != number]
-        if number in rigid or not fewer:
-            continue
-        choose(f"mode {number}", 0.0, 0.5 + 0.5 * tried / len(seen))
-        without = judge.error(cms.keep_modes(whole, fewer))
-        if without <= tolerance:
-            kept, error = fewer, without
+    kept, error = fewest_modes(visible, judge, tolerance, shares.part("modes"))
     smaller = cms.keep_modes(whole, candidates) if len(candidates) < len(seen) else reference
     doubt = 0.0 if smaller is reference else judge.error(smaller)
     reduced = cms.keep_modes(whole, kept)
@@ -243,6 +227,33 @@ def select_modes(
         extra,
         doubtful,
     )
+
+
+def fewest_modes(
+    visible: Candidates, judge: Judge, tolerance: float, progress: Progress
+) -> tuple[list[int], float]:
+    """The modes of which none can be left out, and the error of the model that has them.
+
+    They are added one by one until it is small enough; then those that matter least are tried.
+    """
+    whole, seen = visible.whole, visible.seen
+    rigid = [n for n in visible.numbers if whole.frequencies_hz[n - 1] == 0.0]
+    kept, error = list(rigid), math.inf if len(seen) > len(rigid) else 0.0
+    for number in [n for n in seen if n not in rigid]:
+        kept.append(number)
+        progress(f"mode {number}", 0.0, 0.5 * len(kept) / len(seen))
+        error = judge.error(cms.keep_modes(whole, kept))
+        if error <= tolerance:
+            break
+    for tried, number in enumerate(sorted(kept, key=lambda n: share(whole, judge.setting, n))):
+        fewer = [n for n in kept if n != number]
+        if number in rigid or not fewer:
+            continue
+        progress(f"mode {number}", 0.0, 0.5 + 0.5 * tried / len(seen))
+        without = judge.error(cms.keep_modes(whole, fewer))
+        if without <= tolerance:
+            kept, error = fewer, without
+    return kept, error
 
 
 def around(error: float, doubt: float) -> tuple[float, float]:

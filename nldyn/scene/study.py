@@ -139,15 +139,33 @@ def parameter_study(
         keys = case_fingerprints(cases, scene.file.parent, measure, keep_name)
         done = _read(keep)
         _check_writable(keep)
-    waiting = [k for k, key in enumerate(keys) if key not in done]
     folders = tuple(map(str, scene.mesh_folders))
     task = partial(_measured, str(scene.file), folders, measure)
+    _measure_missing(task, keys, cases, done, ("failure", "case", *names), keep, executor, progress)
+    return _dataset(
+        scene, parameters, design, values, [done[key] for key in keys], label,
+        {"design": design, "seed": seed},
+    )  # fmt: skip
+
+
+def _measure_missing(
+    task: Callable[[Tables], dict[str, Any]],
+    keys: Sequence[str],
+    cases: Sequence[Tables],
+    done: dict[str, Any],
+    taken: Sequence[str],
+    keep: str | Path | None,
+    executor: Executor | None,
+    progress: Callable[[int, int], None] | None,
+) -> None:
+    """Measure the cases that are not yet among those done, and keep each at once."""
+    waiting = [k for k, key in enumerate(keys) if key not in done]
     finished = len(cases) - len(waiting)
     if progress is not None and finished:
         progress(finished, len(cases))
     for outcome in as_finished(task, [cases[k] for k in waiting], executor):
         entry = {"values": outcome.value or {}, "failure": outcome.failure}
-        for name in ("failure", "case", *names):
+        for name in taken:
             if name in entry["values"]:
                 raise SystemModelError(f"study: a measured number must not be named '{name}'")
         key = keys[waiting[outcome.index]]
@@ -157,10 +175,6 @@ def parameter_study(
         finished += 1
         if progress is not None:
             progress(finished, len(cases))
-    return _dataset(
-        scene, parameters, design, values, [done[key] for key in keys], label,
-        {"design": design, "seed": seed},
-    )  # fmt: skip
 
 
 def _checked_names(parameters: Mapping[str, Sequence[Any]]) -> list[str]:

@@ -610,16 +610,7 @@ def diagram(
     )
     box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, (low, high))
     with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
-        effort = search or OrbitSearchOptions()
-        if search is None and wanted:
-            effort = shortened(flow, effort, (low * high) ** 0.5, search_points, wanted)
-        whole = search is not None or effort == OrbitSearchOptions()
-        if not whole:
-            box.notes.append(
-                f"periods take many contacts of {flow.system.size} modes: the search was shortened "
-                f"to {effort.starts} motions of {effort.recorded} periods at each frequency; "
-                "nldyn.diagram(..., search=OrbitSearchOptions()) does all of it"
-            )
+        effort, whole = _effort(box, search, search_points, wanted)
         box.outlook = Outlook(wanted, search_points if wanted else 0, len(seeds))
         edges = np.geomspace(low, high, search_points + 1)
         places = np.sqrt(edges[:-1] * edges[1:])[::-1].tolist() if wanted else []
@@ -627,13 +618,7 @@ def diagram(
         if places and whole and _contact_is_missing(box):
             more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
             _search(box, places, wanted, more)
-        for number, seed in enumerate(seeds, 1):
-            _follow_seed(box, seed, effort)
-            box.reach("seeds", number)
-            if number == 1:  # which has compiled what the others need
-                for other in seeds[1:]:
-                    key, given = _seed_task(box, other, other.near_hz, effort)
-                    box.ahead.offer(key, search_at, *given)
+        _follow_seeds(box, seeds, effort)
         _follow_branch_points(box)
         _follow_flips_of_new(box, wanted, doublings)
         _follow_branch_points(box)
@@ -660,6 +645,26 @@ def _checked_periods(
                 f"seeds: near_hz = {seed.near_hz:g} lies outside range_hz ({low:g}, {high:g})"
             )
     return sorted(set(periods))
+
+
+def _effort(
+    box: Collector, search: OrbitSearchOptions | None, search_points: int, wanted: Sequence[int]
+) -> tuple[OrbitSearchOptions, bool]:
+    """The effort of the search, and whether it is the whole one, or the one asked for."""
+    if search is not None:
+        return search, True
+    effort = OrbitSearchOptions()
+    if wanted:
+        low, high = box.range_hz
+        effort = shortened(box.flow, effort, (low * high) ** 0.5, search_points, wanted)
+    whole = effort == OrbitSearchOptions()
+    if not whole:
+        box.notes.append(
+            f"periods take many contacts of {box.flow.system.size} modes: the search was shortened "
+            f"to {effort.starts} motions of {effort.recorded} periods at each frequency; "
+            "nldyn.diagram(..., search=OrbitSearchOptions()) does all of it"
+        )
+    return effort, whole
 
 
 def _note_missing(box: Collector, wanted: Sequence[int], search_points: int) -> None:
@@ -789,6 +794,19 @@ def _contact_is_missing(box: Collector) -> bool:
     return reach(box.flow.system) > 0.0 and not any(
         orbit.impacts or orbit.max_penetration > 0.0 for orbit in orbits
     )
+
+
+def _follow_seeds(
+    box: Collector, seeds: Sequence[SubharmonicSeed], effort: OrbitSearchOptions
+) -> None:
+    """Follow the branches at seeds, the searches of all but the first ahead of their turn."""
+    for number, seed in enumerate(seeds, 1):
+        _follow_seed(box, seed, effort)
+        box.reach("seeds", number)
+        if number == 1 and box.ahead is not None:  # which has compiled what the others need
+            for other in seeds[1:]:
+                key, given = _seed_task(box, other, other.near_hz, effort)
+                box.ahead.offer(key, search_at, *given)
 
 
 def _follow_seed(box: Collector, seed: SubharmonicSeed, effort: OrbitSearchOptions) -> None:
