@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.base.arrays import Complex, Real
+from nldyn.base.arrays import SLACK, Complex, Real
 from nldyn.base.errors import (
     LARGEST_FREQUENCY,
     SMALLEST_FREQUENCY,
@@ -711,7 +711,7 @@ class Trajectory:
         if phases.ndim != 1 or not (phases[1:] >= phases[:-1]).all():
             raise SystemModelError("phases must be a list of ascending numbers")
         first, last = self._span
-        slack = 1e-9 * max(1.0, abs(last))
+        slack = SLACK * max(1.0, abs(last))
         if phases.size and not first - slack <= phases[0] <= phases[-1] <= last + slack:
             raise SystemModelError(
                 f"phases must lie within the motion, {first:g} to {last:g}, got "

@@ -17,6 +17,8 @@ FINEST, COARSEST = 1e-13, 1e-2  # relative tolerances that can be met, and that 
 TAIL = 0.3  # of √rtol: the error of a Jacobian goes with the square of a panel's tail
 NODE_ANGLE, NODE_ANGLE_PER_DECADE = 0.95, 0.08  # rad at rtol = 1e-9, and more per power of ten
 LATEST = 1e-6  # error in the instant of an event, at most, as a share of the panel
+SHARE = 0.01  # of rtol: what the start of an event may add to the error of a Jacobian
+FINER, ITS_TAIL = 1e-3, 0.03  # times the tolerance and the tail: errors that are negligible
 
 
 @dataclass(frozen=True)
@@ -79,9 +81,8 @@ class FlowOptions:
     @property
     def finer(self) -> FlowOptions:
         """A setting whose errors are negligible beside those of this one."""
-        return FlowOptions(
-            max(1e-3 * self.rtol, FINEST), min(self.panel_nodes + 4, 40), 0.03 * self.panel_tail
-        )
+        rtol, tail = max(FINER * self.rtol, FINEST), ITS_TAIL * self.panel_tail
+        return FlowOptions(rtol, min(self.panel_nodes + 4, 40), tail)
 
     def instant(self, exponent: float) -> float:
         """Error allowed in the instant of an event, as a share of the panel before it.
@@ -92,7 +93,7 @@ class FlowOptions:
         """
         if exponent < ROUND:
             return FINEST
-        return min(float((0.01 * self.rtol) ** (1.0 / exponent)), LATEST)
+        return min(float((SHARE * self.rtol) ** (1.0 / exponent)), LATEST)
 
 
 def _floats(name: str, values: Real) -> Real:

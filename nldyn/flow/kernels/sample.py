@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from nldyn.base.arrays import SLACK
 from nldyn.flow.kernels.compiling import FILES, allocating, inner, njit
 from nldyn.flow.kernels.flights import (
     block_exponential,
@@ -12,7 +13,7 @@ from nldyn.flow.kernels.flights import (
     term_since,
     turned,
 )
-from nldyn.flow.kernels.layout import FLIGHT
+from nldyn.flow.kernels.layout import FLIGHT, SUM_ROUNDING
 from nldyn.flow.kernels.resolution import map_fraction
 from nldyn.runtime.kernel_cache import resting_on
 from nldyn.system.linear import STEADY
@@ -20,6 +21,7 @@ from nldyn.system.linear import STEADY
 compiled = resting_on(njit(cache=True, error_model="numpy"), *FILES)
 
 UNSEEN = 1e-14  # share of a displacement that rounding may be
+PER_HALF_WAVE = 8.0  # samples of the fastest motion that is seen, between which extremes are sought
 MOST_SAMPLES = 3_000_000  # of a piece, a tenth of a second, in which no more extremes are told
 
 
@@ -47,7 +49,7 @@ def stretched_time(tab, kind, x):
             slope = 140.0 * (s * (1.0 - s)) ** 3
             step = error / slope if slope > 0.0 else np.inf
             s = s - step if low < s - step < high else 0.5 * (low + high)
-            if abs(step) <= 1e-15 or high - low <= 1e-15:
+            if abs(step) <= SUM_ROUNDING or high - low <= SUM_ROUNDING:
                 break
     return s
 
@@ -219,7 +221,7 @@ def local_extremes(
         seen = max(omega, leave_unseen(blocks, row, forced, start))
         if kind != FLIGHT:
             seen = max(seen, moved)
-        pieces = int(min(np.ceil(h * seen * (8.0 / np.pi)), MOST_SAMPLES)) + 1
+        pieces = int(min(np.ceil(h * seen * (PER_HALF_WAVE / np.pi)), MOST_SAMPLES)) + 1
         if kind != FLIGHT:
             pieces += tab.nodes.size
             impulses(blocks, force, tab, kind, h, rec_force[piece], shares)
@@ -325,7 +327,7 @@ def turning_point(
             if step > 0 and last > middle:
                 rate_lo *= shrink(rate_middle, rate_hi)
             hi, rate_hi = middle, rate_middle
-        if abs(middle - last) <= 1e-9 * spacing or rate_middle == 0.0:
+        if abs(middle - last) <= SLACK * spacing or rate_middle == 0.0:
             break
     return middle, value
 

@@ -128,19 +128,18 @@ def found(start, ends, options):
     return sorted(s.frequency_hz for s in branch.special_points if s.kind == "NS")
 
 
-@pytest.mark.parametrize("start", [63.40, 63.45, 63.50, 63.55, 63.75])
-def test_pairs_that_touch_the_circle_are_found_from_any_start(start):
-    """Two pairs pass one another; for 0.003 Hz one of them is outside, by 1e-5."""
-    expected = found(63.61, (63.55, 63.75), SHORT)
-    assert len(expected) == 3
-    inside = [hz for hz in found(start, (63.3, 64.0), LONG) if 63.55 < hz < 63.75]
-    assert inside == pytest.approx(expected, rel=1e-8)
+# two pairs pass one another, and for 0.003 Hz one of them is outside, by 1e-5; 0.016 Hz apart one
+# pair comes in and another goes out, so that as many as before are outside
+TOUCH = (63.61, (63.55, 63.75), 3, (63.3, 64.0), [63.40, 63.45, 63.50, 63.55, 63.75])
+EXCHANGE = (28.74, (28.715, 28.765), 2, (28.55, 29.1), [28.60, 28.68, 28.70, 28.90, 29.0])
 
 
-@pytest.mark.parametrize("start", [28.60, 28.68, 28.70, 28.90, 29.0])
-def test_one_pair_out_and_another_in_are_found_from_any_start(start):
-    """0.016 Hz apart one pair comes in and another goes out, as many as before are outside."""
-    expected = found(28.74, (28.715, 28.765), SHORT)
-    assert len(expected) == 2
-    inside = [hz for hz in found(start, (28.55, 29.1), LONG) if 28.715 < hz < 28.765]
+@pytest.mark.parametrize(
+    ("middle", "range_hz", "count", "wide_hz", "start"),
+    [(*case, start) for *case, starts in (TOUCH, EXCHANGE) for start in starts],
+)
+def test_pairs_at_the_circle_are_found_from_any_start(middle, range_hz, count, wide_hz, start):
+    expected = found(middle, range_hz, SHORT)
+    assert len(expected) == count
+    inside = [hz for hz in found(start, wide_hz, LONG) if range_hz[0] < hz < range_hz[1]]
     assert inside == pytest.approx(expected, rel=1e-8)

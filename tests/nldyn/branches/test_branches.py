@@ -356,20 +356,6 @@ def test_torus_test_changes_sign_where_a_pair_leaves_the_circle(angle):
     assert inside * outside < 0.0
 
 
-@pytest.mark.parametrize("index", [0, 1, 2])
-def test_both_orbits_close_to_a_fold_are_given(harmonic_branch, index):
-    folds = [s for s in harmonic_branch.special_points if s.kind == "LP"]
-    fold, hz = folds[index], harmonic_branch.frequency_hz
-    nodes = harmonic_branch.nodes
-    i = next(k for k, n in enumerate(nodes) if n.arclength > fold.point.arclength)
-    nearest = min(hz[i - 1 : i + 1], key=lambda f: abs(f - fold.frequency_hz))
-    between = 0.5 * (fold.frequency_hz + nearest)
-    height = fold.orbit.max_abs_displacement
-    found = [abs(o.max_abs_displacement / height - 1.0) for o in harmonic_branch.at(between)]
-    assert sorted(found)[1] < 0.03
-    assert all(harmonic_branch.contains(orbit) for orbit in harmonic_branch.at(between))
-
-
 # --- walking -------------------------------------------------------------------------------------
 
 

@@ -181,14 +181,3 @@ def test_every_point_of_the_branch_is_a_solution(harmonic_branch):
     for orbit in harmonic_branch.points:
         assert orbit.error < 1e-8
         assert orbit.liouville_error < 1e-7
-
-
-def test_branch_at_a_frequency_gives_all_its_orbits(harmonic_branch):
-    """Between the folds at 12.09 and 12.27 Hz the branch passes three times."""
-    orbits = harmonic_branch.at(12.2)
-    assert len(orbits) == 3
-    assert {orbit.stable for orbit in orbits} == {True, False}
-    assert all(orbit.frequency_hz == pytest.approx(12.2, rel=1e-13) for orbit in orbits)
-    assert len(harmonic_branch.at(26.0)) == 1
-    assert harmonic_branch.at(95.0) == []
-    assert harmonic_branch.contains(orbits[1])
