@@ -362,27 +362,24 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
             system = build_system(loaded, reduced)
             with told_as(loaded, (), SystemModelError):
                 at_rest = describe_rest(system)
+        highest_hz = float(system.frequencies_hz.max())
         if as_json:
             from nldyn.report.modes import mode_table
             from nldyn.scene.build import Structure
 
             check_computable(loaded, scene)
             table = mode_table(loaded, Structure(component, reduced))
-            print_json(
-                {
-                    "scene": str(scene),
-                    "title": loaded.title,
-                    "degrees_of_freedom": sum(p.mass.shape[0] for p in parts.values()) or None,
-                    "mass_kg": table.mass,
-                    "modes": table.as_json(),
-                    "static_flexibility_m_per_n": {
-                        name: static_flexibility(system, name) for name in system.interfaces
-                    },
-                    "stops": [describe_stop(stop) for stop in system.stops],
-                    "at_rest": at_rest,
-                    "notes": remarks(loaded, float(system.frequencies_hz.max())),
-                }
-            )
+            count = sum(part.mass.shape[0] for part in parts.values()) or None
+            print_json({
+                "scene": str(scene),
+                "title": loaded.title,
+                "degrees_of_freedom": count,
+                "mass_kg": table.mass,
+                "modes": table.as_json(),
+                **described_as_json(system),
+                "at_rest": at_rest,
+                "notes": remarks(loaded, highest_hz),
+            })  # fmt: skip
             return
         echo_parts(parts)
         described = describe_system(system, 0 if reduced is None else reduced.residual_modes)
@@ -393,9 +390,19 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
                 f"modes up to {candidates.cutoff_hz:.4g} Hz may matter; of these, 'nldyn run' "
                 f"keeps as many as tolerance = {loaded.reduction.tolerance:g} needs"
             )
-        for remark in remarks(loaded, float(system.frequencies_hz.max())):
+        for remark in remarks(loaded, highest_hz):
             click.echo(f"note: {remark}")
         click.echo(f"{scene}: no fault found")
+
+
+def described_as_json(system: System) -> dict[str, object]:
+    """Static flexibilities and stops of a system."""
+    return {
+        "static_flexibility_m_per_n": {
+            name: static_flexibility(system, name) for name in system.interfaces
+        },
+        "stops": [describe_stop(stop) for stop in system.stops],
+    }
 
 
 def echo_parts(parts: Mapping[str, Any]) -> None:

@@ -43,6 +43,7 @@ AnySpring = Spring | PolynomialSpring
 AnyDamper = Damper | CubicDamper
 LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
 NEGATIVE = 1e-10  # of a stiffness with a unit diagonal: an eigenvalue that is not rounding
+FEW = 8.0  # roundings of each mode in the largest ω²
 
 
 class Clock(NamedTuple):
@@ -257,16 +258,7 @@ class System:
         K = _symmetric("stiffness", stiffness)
         if K.shape != M.shape:
             raise SystemModelError(f"stiffness is {K.shape} but mass is {M.shape}")
-        try:
-            squared, modes = sla.eigh(K, M)
-        except sla.LinAlgError:
-            raise SystemModelError("mass must be positive definite") from None
-        if not np.all(np.isfinite(squared)):
-            raise SystemModelError("mass is too small beside the stiffness to compute with")
-        rounding = 8.0 * squared.size * np.finfo(float).eps * squared[-1]
-        if squared[0] < -rounding and _negative(K):
-            raise SystemModelError("stiffness must not be negative in any direction")
-        omega = np.sqrt(np.maximum(squared, 0.0))
+        omega, modes = _natural_modes(K, M)
         D = _modal_damping(omega, modal_damping)
         if damping is not None:
             C = _symmetric("damping", damping)
@@ -889,6 +881,20 @@ def _of_size(spin: Spin, size: int) -> Spin:
 
 def _or_zero(matrix: Real | None) -> Real:
     return np.zeros(0) if matrix is None else matrix
+
+
+def _natural_modes(K: Real, M: Real) -> tuple[Real, Real]:
+    """Natural frequencies ω (n,) and the modes (n, n) with unit modal masses."""
+    try:
+        squared, modes = sla.eigh(K, M)
+    except sla.LinAlgError:
+        raise SystemModelError("mass must be positive definite") from None
+    if not np.all(np.isfinite(squared)):
+        raise SystemModelError("mass is too small beside the stiffness to compute with")
+    rounding = FEW * squared.size * np.finfo(float).eps * squared[-1]
+    if squared[0] < -rounding and _negative(K):
+        raise SystemModelError("stiffness must not be negative in any direction")
+    return np.sqrt(np.maximum(squared, 0.0)), modes
 
 
 def _negative(K: Real) -> bool:
