@@ -4,8 +4,6 @@ The names are loaded when they are first asked for: `import nldyn` itself takes 
 the command line answers at once. The list of them, with their homes, is ``nldyn/__init__.pyi``.
 """
 
-from pathlib import Path
-
 from nldyn.base.face import face
 
-__getattr__, __dir__, __all__ = face(__name__, Path(__file__).parent)
+__getattr__, __dir__, __all__ = face(__name__, __path__)

@@ -9,6 +9,7 @@ import matplotlib
 import matplotlib.pyplot as plt
 import pytest
 
+import nldyn
 from nldyn.base.face import homes
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -22,7 +23,7 @@ def test_every_page_is_in_the_list():
 
 
 def test_every_room_with_public_names_has_a_page():
-    homes_of_all = homes("nldyn", DOCS.parent / "nldyn").values()
+    homes_of_all = homes("nldyn", nldyn.__path__).values()
     rooms = {".".join(home.split(".")[:2]) for home in homes_of_all}
     shown = "".join(page.read_text(encoding="utf-8") for page in DOCS.glob("api/*.md"))
     assert rooms - set(re.findall(r"^```\{public\} (.*)$", shown, flags=re.M)) == set()

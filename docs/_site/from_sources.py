@@ -42,7 +42,7 @@ def navigation(text: str) -> str:
 
 def public_names(room: str) -> list[str]:
     """Full names of what a package shows, or a room of nldyn."""
-    known = homes("nldyn", DOCS.parent / "nldyn")
+    known = homes("nldyn", nldyn.__path__)
     in_the_face = [name for name in nldyn.__all__ if known[name].startswith(f"{room}.")]
     shown = getattr(import_module(room), "__all__", ())
     return [f"nldyn.{name}" for name in in_the_face] + [f"{room}.{name}" for name in shown]

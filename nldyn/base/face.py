@@ -1,14 +1,14 @@
 """The face of a package: one list of names, which are loaded when they are first asked for."""
 
 import ast
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 
 
-def homes(package: str, folder: Path) -> dict[str, str]:
+def homes(package: str, path: Sequence[str]) -> dict[str, str]:
     """Modules of the names in a package's stub; a sub-package that it lists is its own home."""
-    stub = ast.parse((folder / "__init__.pyi").read_text(encoding="utf-8"))
+    stub = ast.parse(Path(path[0], "__init__.pyi").read_text(encoding="utf-8"))
     return {
         name.name: f"{package}.{name.name}" if node.module == package else str(node.module)
         for node in stub.body
@@ -18,13 +18,13 @@ def homes(package: str, folder: Path) -> dict[str, str]:
 
 
 def face(
-    package: str, folder: Path
+    package: str, path: Sequence[str]
 ) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
     """``__getattr__``, ``__dir__`` and ``__all__`` of a package whose stub lists its names.
 
     Sub-packages are attributes, but no part of ``__all__``.
     """
-    known = homes(package, folder)
+    known = homes(package, path)
 
     def load(name: str) -> object:
         if name not in known:

@@ -1,7 +1,5 @@
-"""What is public here and not in the face of nldyn: the list is the stub beside this file."""
-
-from pathlib import Path
+"""What is computed; the stub beside lists what is public."""
 
 from nldyn.base.face import face
 
-__getattr__, __dir__, __all__ = face(__name__, Path(__file__).parent)
+__getattr__, __dir__, __all__ = face(__name__, __path__)
