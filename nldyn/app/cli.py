@@ -6,106 +6,45 @@ animation needs something that is not installed, 130 stopped with Ctrl-C.
 
 from __future__ import annotations
 
-import json
-import math
-import os
 import sys
 import time
 import warnings
-from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
+from nldyn.app.describe import (
+    describe,
+    describe_rest,
+    describe_system,
+    described_as_json,
+    echo_parts,
+    print_json,
+    special_counts,
+)
+from nldyn.app.options import (
+    any_path,
+    drawn_modes_option,
+    jobs_option,
+    json_option,
+    mesh_option,
+    number_list,
+    out_option,
+    quiet_option,
+    replace_option,
+    scene_argument,
+    view_option,
+)
 from nldyn.base.exit_codes import BAD_INPUT, INTERRUPTED, NO_GRAPHICS, NOTHING_FOUND
 from nldyn.report.console import kept_at_interrupt, plain_errors, told_what_is_kept
 from nldyn.runtime.interruption import STOPPED, interrupted
 
 if TYPE_CHECKING:
-    from nldyn.base.arrays import Real
     from nldyn.scene.build import Structure
     from nldyn.scene.schema import Scene
-    from nldyn.search.diagram import Diagram
-    from nldyn.system.rigid_stop import AnyStop
-    from nldyn.system.system import AnySpring, System
-
-
-def usable_cores() -> int:
-    """How many cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-any_path = click.Path(path_type=Path, readable=False)  # what is wrong with it is said later
-scene_argument = click.argument("scene", type=any_path, metavar="SCENE.toml")
-out_option = click.option(
-    "--out",
-    required=True,
-    type=any_path,
-    metavar="DIR",
-    help="Directory for the results: new, empty, or of an earlier run.",
-)
-mesh_option = click.option(
-    "--mesh-folder",
-    "mesh_folders",
-    multiple=True,
-    type=any_path,
-    metavar="DIR",
-    help="Folder from which the mesh may come, beside those of the scene and the current one.",
-)
-replace_option = click.option(
-    "--replace", is_flag=True, help="Replace results of another scene in DIR."
-)
-quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
-jobs_option = click.option(
-    "--jobs",
-    type=click.IntRange(1, 1000),
-    default=usable_cores,
-    show_default="all cores",
-    metavar="N",
-    help="Processes that share the work; the results do not depend on it.",
-)
-
-
-def number_list(
-    _context: click.Context, _parameter: click.Parameter, value: str | None
-) -> list[int] | None:
-    """Read whole numbers with commas between them, or ranges like 1-10."""
-    if value is None:
-        return None
-    found: set[int] = set()
-    for piece in value.split(","):
-        first, _dash, last = piece.strip().partition("-")
-        if not first.isdecimal() or (last and not last.isdecimal()):
-            raise click.BadParameter(f"'{value}' is not a list of whole numbers such as 1-10,20")
-        if int(last or first) < int(first):
-            raise click.BadParameter(f"'{value}': the range {piece.strip()} runs downwards")
-        if int(last or first) - int(first) > 1000:
-            raise click.BadParameter(f"'{value}' names more than 1000 numbers")
-        found |= set(range(int(first), int(last or first) + 1))
-    return sorted(found)
-
-
-json_option = click.option(
-    "--json", "as_json", is_flag=True, help="Print a summary as JSON instead of text."
-)
-view_option = click.option(
-    "--view",
-    type=click.Choice(["oblique", "front", "top", "side", "isometric"]),
-    default="oblique",
-    show_default=True,
-    help="From where the pictures are taken; y is up.",
-)
-drawn_modes_option = click.option(
-    "--modes",
-    callback=number_list,
-    metavar="LIST",
-    help="Modes to show, such as 1-4,7; all unless given.",
-)
 
 
 def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -395,30 +334,6 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
         click.echo(f"{scene}: no fault found")
 
 
-def described_as_json(system: System) -> dict[str, object]:
-    """Static flexibilities and stops of a system."""
-    return {
-        "static_flexibility_m_per_n": {
-            name: static_flexibility(system, name) for name in system.interfaces
-        },
-        "stops": [describe_stop(stop) for stop in system.stops],
-    }
-
-
-def echo_parts(parts: Mapping[str, Any]) -> None:
-    """What was read of each component of a scene."""
-    import cms
-    import fem
-
-    for name, part in parts.items():
-        if name:
-            click.echo(f"component '{name}':")
-        if isinstance(part, cms.Matrices):
-            click.echo(f"matrices of {part.mass.shape[0]} degrees of freedom")
-        else:
-            click.echo(fem.summary(part))
-
-
 @main.command()
 @scene_argument
 @click.option(
@@ -696,19 +611,6 @@ def written_by(out: Path, kind: str) -> str:
     return ", ".join(written_files(out, kind))
 
 
-def print_json(content: Mapping[str, object]) -> None:
-    """Print JSON on stdout; numbers that are not finite become null."""
-
-    def plain(value: object) -> object:
-        if isinstance(value, float):
-            return value if math.isfinite(value) else None
-        if isinstance(value, Mapping):
-            return {key: plain(each) for key, each in value.items()}
-        return [plain(each) for each in value] if isinstance(value, list | tuple) else value
-
-    click.echo(json.dumps(plain(content), indent=1, allow_nan=False))
-
-
 @main.command()
 @scene_argument
 @out_option
@@ -909,121 +811,3 @@ def check_results(out: Path, scene: Scene, replace: bool) -> None:
             f"{out}: holds the results of a scene that says something else; choose another "
             "directory, or replace them with --replace"
         )
-
-
-def describe(diagram: Diagram, seconds: float, out: Path) -> str:
-    """Say in a few lines what was computed."""
-    branches = diagram.branches
-    kinds = special_counts(diagram)
-    found = ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "none"
-    points = sum(len(branch.points) for branch in branches)
-    lines = [
-        f"{len(branches)} {'branch' if len(branches) == 1 else 'branches'} with {points} points "
-        f"in {seconds:.1f} s",
-        f"special points: {found}",
-        *(f"note: {note}" for note in dict.fromkeys(diagram.notes)),
-        f"written to {out}; {out / 'report.html'} is a page for a browser",
-    ]
-    return "\n".join(lines)
-
-
-def special_counts(diagram: Diagram) -> dict[str, int]:
-    """How many special points there are of each kind."""
-    special = (point for branch in diagram.branches for point in branch.special_points)
-    return dict(sorted(Counter(str(point.kind) for point in special).items()))
-
-
-def describe_system(system: System, residual: int = 0) -> str:
-    """Tabulate frequencies and participation of the modes, and the static flexibility.
-
-    The last ``residual`` modes are marked as such.
-    """
-    import numpy as np
-
-    names = list(system.interfaces)
-    width = max(14, *(len(name) + 2 for name in names))
-    lines = ["mode   frequency (Hz)   participation (1/sqrt(kg)) at"]
-    lines.append(" " * 23 + "".join(f"{name:>{width}}" for name in names))
-    for mode, hz in enumerate(system.frequencies_hz):
-        values = "".join(f"{system.participation[name][mode]:>{width}.6g}" for name in names)
-        mark = "  residual" if mode >= system.size - residual else ""
-        lines.append(f"{mode + 1:>4}{hz:>19.6f}{values}{mark}")
-    flexibility = "".join(f"{static_flexibility(system, name):>{width}.6g}" for name in names)
-    lines.append(f"{'static flexibility m/N':<23}{flexibility}")
-    lines += [describe_stop(stop) for stop in system.stops]
-    lines += [describe_spring(spring) for spring in system.springs]
-    if np.any(system.spring_stiffness):
-        hz = ", ".join(f"{value:.6f}" for value in system.linear.frequencies_hz)
-        lines.append(f"frequencies with the springs: {hz} Hz")
-    return "\n".join(lines)
-
-
-def describe_rest(system: System) -> list[str]:
-    """Say where the structure rests, and what holds it, if that is not at zero."""
-    from nldyn.system.equilibrium import closed_at_rest, rest_positions
-
-    found = rest_positions(system)
-    q, others = found[0], found[1:]
-    if not q.any() and not others:
-        return []
-    places = _places(system, q)
-    return [
-        f"at rest: {places}",
-        *(f"or at rest: {_places(system, other)}" for other in others),
-        *(
-            f"at rest the stop at '{system.stops[i].at}' is closed by {depth:.6g} m: {force:.6g} N"
-            for i, depth, force in closed_at_rest(system, q)
-        ),
-    ]
-
-
-def _places(system: System, q: Real) -> str:
-    return ", ".join(
-        f"{float(phi @ q):.6g} m at '{name}'" for name, phi in system.participation.items()
-    )
-
-
-def describe_stop(stop: AnyStop) -> str:
-    """Say in a line where a stop is and what it does."""
-    from nldyn.system.rigid_stop import RigidStop
-
-    if isinstance(stop, RigidStop):
-        return (
-            f"rigid stop {_place(stop)}: restitution {stop.restitution_at(1.0):g}, "
-            f"gap {stop.gap:g} m, direction {stop.direction:+d}"
-        )
-    unit = "N/m" if stop.exponent == 1.0 else f"N/m^{stop.exponent:g}"
-    loss = f", dissipation {stop.dissipation:g} s/m" if stop.dissipation else ""
-    loss += f", dashpot {stop.dashpot:g} N s/m" if stop.dashpot else ""
-    loss += "" if stop.pulls else " (never pulls)"
-    return (
-        f"stop {_place(stop)}: {stop.stiffness:.6g} {unit}, gap {stop.gap:g} m, "
-        f"direction {stop.direction:+d}{loss}"
-    )
-
-
-def describe_spring(spring: AnySpring) -> str:
-    """Say in a line where a spring is and what it does."""
-    where = f"at '{spring.at}'" + (f" against '{spring.against}'" if spring.against else "")
-    values = getattr(spring, "coefficients", None) or (getattr(spring, "stiffness", 0.0),)
-    terms = [f"{k:.6g} N/m" + (f"^{j}" if j > 1 else "") for j, k in enumerate(values, 1) if k]
-    return f"spring {where}: {', '.join(terms) or '0 N/m'}"
-
-
-def _place(stop: AnyStop) -> str:
-    return f"at '{stop.at}'" + (f" against '{stop.against}'" if stop.against else "")
-
-
-def static_flexibility(system: System, interface: str) -> float:
-    """Displacement in m at an interface for a steady force of 1 N there; inf if nothing holds."""
-    import numpy as np
-
-    phi = system.participation[interface]
-    if system.springs:
-        displaced = np.linalg.lstsq(system.stiffness, phi, rcond=None)[0]
-        left = np.linalg.norm(system.stiffness @ displaced - phi)
-        return float(phi @ displaced) if left <= 1e-9 * np.linalg.norm(phi) else float("inf")
-    shares, squares = phi**2, system.natural_frequencies**2
-    if any(shares[squares == 0.0] > 1e-18 * shares.max()):  # a free motion that it sees
-        return float("inf")
-    return float(sum(shares[squares > 0.0] / squares[squares > 0.0]))

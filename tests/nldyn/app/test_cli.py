@@ -14,7 +14,8 @@ import nldyn.paper
 import nldyn.runtime.progress
 import nldyn.scene.run
 from nldyn import System
-from nldyn.app.cli import main, static_flexibility
+from nldyn.app.cli import main
+from nldyn.app.describe import static_flexibility
 from nldyn.base.resources import example, mesh
 from nldyn.branches.arclength import Stepper
 from nldyn.io.branches import load_branches, load_diagram, load_exploration, save_branches

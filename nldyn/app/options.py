@@ -1,0 +1,83 @@
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import click
+
+
+def usable_cores() -> int:
+    """How many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+any_path = click.Path(path_type=Path, readable=False)  # what is wrong with it is said later
+scene_argument = click.argument("scene", type=any_path, metavar="SCENE.toml")
+out_option = click.option(
+    "--out",
+    required=True,
+    type=any_path,
+    metavar="DIR",
+    help="Directory for the results: new, empty, or of an earlier run.",
+)
+mesh_option = click.option(
+    "--mesh-folder",
+    "mesh_folders",
+    multiple=True,
+    type=any_path,
+    metavar="DIR",
+    help="Folder from which the mesh may come, beside those of the scene and the current one.",
+)
+replace_option = click.option(
+    "--replace", is_flag=True, help="Replace results of another scene in DIR."
+)
+quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
+jobs_option = click.option(
+    "--jobs",
+    type=click.IntRange(1, 1000),
+    default=usable_cores,
+    show_default="all cores",
+    metavar="N",
+    help="Processes that share the work; the results do not depend on it.",
+)
+
+
+def number_list(
+    _context: click.Context, _parameter: click.Parameter, value: str | None
+) -> list[int] | None:
+    """Read whole numbers with commas between them, or ranges like 1-10."""
+    if value is None:
+        return None
+    found: set[int] = set()
+    for piece in value.split(","):
+        first, _dash, last = piece.strip().partition("-")
+        if not first.isdecimal() or (last and not last.isdecimal()):
+            raise click.BadParameter(f"'{value}' is not a list of whole numbers such as 1-10,20")
+        if int(last or first) < int(first):
+            raise click.BadParameter(f"'{value}': the range {piece.strip()} runs downwards")
+        if int(last or first) - int(first) > 1000:
+            raise click.BadParameter(f"'{value}' names more than 1000 numbers")
+        found |= set(range(int(first), int(last or first) + 1))
+    return sorted(found)
+
+
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print a summary as JSON instead of text."
+)
+view_option = click.option(
+    "--view",
+    type=click.Choice(["oblique", "front", "top", "side", "isometric"]),
+    default="oblique",
+    show_default=True,
+    help="From where the pictures are taken; y is up.",
+)
+drawn_modes_option = click.option(
+    "--modes",
+    callback=number_list,
+    metavar="LIST",
+    help="Modes to show, such as 1-4,7; all unless given.",
+)
