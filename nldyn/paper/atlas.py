@@ -26,7 +26,8 @@ from nldyn.report.results import write_table
 from nldyn.runtime.files import write_whole
 from nldyn.runtime.progress import Progress
 from nldyn.runtime.result_directory import OutputError
-from nldyn.search.diagram import Diagram, notes_on_ends
+from nldyn.search.collector import notes_on_ends
+from nldyn.search.diagram import Diagram
 from nldyn.search.fixed_point_index import index_note
 
 # Branches of the larger models are long. One that is cut off by max_points would be found and

@@ -28,7 +28,8 @@ from nldyn.runtime.progress import Progress, silent
 from nldyn.scene.build import build_system
 from nldyn.scene.component import build_component
 from nldyn.scene.read import load_scene
-from nldyn.search.diagram import Collector, Diagram, SubharmonicSeed, diagram
+from nldyn.search.collector import Collector
+from nldyn.search.diagram import Diagram, SubharmonicSeed, diagram
 from nldyn.system.stop import Stop
 from nldyn.system.system import System
 

@@ -28,7 +28,8 @@ from nldyn.orbits.starts import orbit_near
 from nldyn.paper.kept import read_diagram
 from nldyn.runtime.files import write_whole
 from nldyn.runtime.progress import Progress, silent
-from nldyn.search.diagram import Collector, Diagram, middle_orbit
+from nldyn.search.collector import Collector, middle_orbit
+from nldyn.search.diagram import Diagram
 from nldyn.system.system import System
 
 DATA = Path(__file__).parent / "data"

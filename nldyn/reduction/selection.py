@@ -15,14 +15,14 @@ from nldyn.branches.peaks import resonance_peaks
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
 from nldyn.reduction.candidates import BEYOND, Candidates, candidate_modes, share
-from nldyn.reduction.convergence import (
+from nldyn.reduction.load_case import LoadCase
+from nldyn.reduction.model_errors import (
     harmonic_branch,
     largest_force,
     matched,
     special_points_of,
     told,
 )
-from nldyn.reduction.load_case import LoadCase
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.system.system import System
 

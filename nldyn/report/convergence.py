@@ -11,7 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from nldyn.plot.diagram import MARKERS, PERIOD_COLOURS, new_axes, save_figure
-from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy, counted_modes
+from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy
+from nldyn.reduction.model_errors import counted_modes
 from nldyn.report.convergence_page import write_study_page
 from nldyn.report.convergence_tables import study_tables
 from nldyn.report.results import write_table

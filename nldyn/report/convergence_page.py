@@ -9,10 +9,9 @@ from typing import Any
 
 from nldyn.orbits.orbit import Orbit
 from nldyn.plot.diagram import axis_unit, length_unit
-from nldyn.reduction.convergence import (
+from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy
+from nldyn.reduction.model_errors import (
     EIGENFREQUENCIES,
-    QUANTITIES,
-    ConvergenceStudy,
     Measured,
     contact_time,
     counted_modes,

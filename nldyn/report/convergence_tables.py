@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy, contact_time, largest_force
+from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy
+from nldyn.reduction.model_errors import contact_time, largest_force
 from nldyn.report.offline import Table
 from nldyn.report.results import if_known
 

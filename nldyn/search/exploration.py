@@ -18,7 +18,8 @@ from nldyn.branches.step_control import MOST_POINTS, ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, same_flow
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import MOST_COUNT, settling_periods
-from nldyn.search.diagram import Diagram, counted
+from nldyn.search.collector import counted
+from nldyn.search.diagram import Diagram
 from nldyn.search.fixed_point_index import index_note, is_damped
 
 FINEST_SPACING = 1e-6

@@ -37,7 +37,8 @@ from nldyn.orbits.starts import (
 )
 from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.threads import one_thread
-from nldyn.search.diagram import MOST_JOBS, Collector, Diagram, check_known
+from nldyn.search.collector import Collector
+from nldyn.search.diagram import MOST_JOBS, Diagram, check_known
 from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
 from nldyn.search.extend import Place, Strategy
 from nldyn.search.fixed_point_index import is_damped, sum_of_indices, without_index_note

@@ -22,7 +22,8 @@ from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import MOST_COUNT
 from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.threads import one_thread
-from nldyn.search.diagram import Collector, Diagram, check_known, counted, middle_orbit
+from nldyn.search.collector import Collector, counted, middle_orbit
+from nldyn.search.diagram import Diagram, check_known
 from nldyn.search.exploration import check_spacing, steps_between
 from nldyn.search.fixed_point_index import index_note, is_damped, without_index_note
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.branches.branch import Branch
 from nldyn.orbits.starts import SHORT_STEPS, nearest_orbit
-from nldyn.search.diagram import Collector
+from nldyn.search.collector import Collector
 from nldyn.search.extend import Guesses, Place, check_numbers, orbits_near, relative_distance
 from nldyn.search.pseudo_orbits import nodes_of
 

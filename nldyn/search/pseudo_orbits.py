@@ -18,7 +18,7 @@ from nldyn.branches.branch import Branch
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import SEGMENTS_PER_PERIOD
 from nldyn.orbits.starts import LONG_STEPS, SHORT_STEPS, nearest_orbit
-from nldyn.search.diagram import Collector
+from nldyn.search.collector import Collector
 from nldyn.search.extend import Guesses, Place, check_numbers
 
 NODES = 8  # states of an orbit in each period

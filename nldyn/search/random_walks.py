@@ -20,7 +20,7 @@ from nldyn.orbits.newton import spread
 from nldyn.orbits.orbit import stroboscopic
 from nldyn.orbits.shooting import SEGMENTS_PER_PERIOD, shooting_problem
 from nldyn.orbits.starts import SHORT_STEPS, nearest_orbit, random_states, reach, simulate
-from nldyn.search.diagram import Collector
+from nldyn.search.collector import Collector
 from nldyn.search.exploration import MOST_NUMBERS, check_walk_states
 from nldyn.search.extend import (
     WINDOW,

@@ -16,7 +16,7 @@ from nldyn.branches.checkpoint import Checkpoint
 from nldyn.io import CheckpointFile
 from nldyn.io.branches import load_branches, save_branches
 from nldyn.search import ClosedWalks, Mixtures, PseudoOrbits
-from nldyn.search.diagram import Collector
+from nldyn.search.collector import Collector
 
 WAYS = {
     "closed walks": ClosedWalks(states=50, tries=4, seed=1),

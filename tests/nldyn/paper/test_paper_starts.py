@@ -25,7 +25,7 @@ from nldyn.paper.jobs import scene_system
 from nldyn.paper.starts import Start, follow_starts, read_starts, starts_path, write_starts
 from nldyn.runtime.progress import silent
 from nldyn.runtime.result_directory import OutputError
-from nldyn.search.diagram import middle_orbit
+from nldyn.search.collector import middle_orbit
 from nldyn.search.fixed_point_index import index_note
 
 WITHOUT_DOUBLED = (1, 50)

@@ -27,9 +27,9 @@ from nldyn import (
 )
 from nldyn.app.cli import main
 from nldyn.base.resources import example
-from nldyn.reduction import convergence
-from nldyn.reduction.convergence import (
-    QUANTITIES,
+from nldyn.reduction import convergence, model_errors
+from nldyn.reduction.convergence import QUANTITIES
+from nldyn.reduction.model_errors import (
     contact_time,
     distance,
     errors_of,
@@ -71,8 +71,9 @@ def test_the_full_model_is_the_reference(study):
 
 
 def test_the_reference_of_a_large_component_has_a_bound_of_its_own_error(monkeypatch):
-    monkeypatch.setattr(convergence, "ALL_MODES_UP_TO", 40)
-    monkeypatch.setattr(convergence, "FEWEST_REFERENCE_MODES", 6)
+    for module in (convergence, model_errors):
+        monkeypatch.setattr(module, "ALL_MODES_UP_TO", 40)
+    monkeypatch.setattr(model_errors, "FEWEST_REFERENCE_MODES", 6)
     study = convergence_study(string(), SETTING, modes=(1, 2))
     assert (study.reference.label, study.reference.modes) == ("reference", 6)
     assert "reference: rubin with 6 modes (its undamped receptance is within" in study.report()

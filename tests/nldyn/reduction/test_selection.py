@@ -16,7 +16,7 @@ from nldyn import LoadCase, Stop, SystemModelError, Unbalance, select_modes, sol
 from nldyn.base.resources import example
 from nldyn.branches.peaks import resonance_peaks
 from nldyn.reduction.candidates import contact_duration
-from nldyn.reduction.convergence import harmonic_branch, largest_force, matched, special_points_of
+from nldyn.reduction.model_errors import harmonic_branch, largest_force, matched, special_points_of
 from nldyn.scene.component import build_component
 from nldyn.scene.load_case import load_case_of
 from nldyn.scene.read import load_scene

@@ -7,7 +7,7 @@ from browser import opened, skip_without_browser, until
 from problems import SETTING, string
 
 from nldyn import convergence_study
-from nldyn.reduction.convergence import largest_force
+from nldyn.reduction.model_errors import largest_force
 from nldyn.report.convergence import write_study
 
 skip_without_browser()

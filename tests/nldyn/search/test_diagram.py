@@ -162,7 +162,7 @@ def test_diagram_says_which_orbit_it_could_not_follow(monkeypatch):
     def fails(orbit, *_, **__):
         raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: singular Jacobian")
 
-    monkeypatch.setattr("nldyn.search.diagram.start_point", fails)
+    monkeypatch.setattr("nldyn.search.collector.start_point", fails)
     found = diagram(make_one_dof(stops=[]), (25.0, 27.0), periods=(1,), search_points=1)
     assert found.branches == ()
     assert found.notes[0].startswith("orbit of period 1 found but not followed: no orbit at 25.98")

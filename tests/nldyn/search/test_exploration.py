@@ -46,7 +46,7 @@ from nldyn.runtime.progress import silent
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene
 from nldyn.search import explore as survey
-from nldyn.search.diagram import Collector, middle_orbit
+from nldyn.search.collector import Collector, middle_orbit
 from nldyn.search.exploration import chao_lower_bound
 
 NOTHING_MORE = {"pseudo_orbits": 0, "mixtures": 0, "walks": 0}  # beside motions and deflation

@@ -5,7 +5,7 @@ import pytest
 from scipy import sparse
 
 from nldyn import System, SystemModelError
-from nldyn.reduction.convergence import frequency_error
+from nldyn.reduction.model_errors import frequency_error
 
 
 def test_sparse_matrices_of_a_system():

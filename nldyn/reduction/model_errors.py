@@ -1,0 +1,473 @@
+"""What is measured of a reduced model, and how far that of two models is apart."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import cms
+from cms.component.component import checked_pencil
+from nldyn.base.arrays import SLACK, Complex, Real
+from nldyn.base.errors import ConvergenceError
+from nldyn.branches.branch import Branch
+from nldyn.branches.continuation import continue_branch
+from nldyn.branches.peaks import resonance_peaks
+from nldyn.flow.flow_map import FlowMap
+from nldyn.orbits.newton import refine
+from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.solve import solve_orbit
+from nldyn.reduction.load_case import LoadCase
+from nldyn.runtime.progress import Progress, silent
+from nldyn.system.springs_dampers import Damper, Spring
+from nldyn.system.system import System
+
+GRID = 400
+LONGEST_SEARCH = 600.0  # s of processor time for the orbit with which a harmonic branch begins
+EIGENFREQUENCIES = 3
+SPECIAL_KINDS = ("LP", "PD")
+MATCH = 0.02  # special points of one kind farther apart are not the same
+INVISIBLE = 1e-9
+ALL_MODES_UP_TO = 1500  # degrees of freedom; of larger components the reference is reduced, too
+FEWEST_REFERENCE_MODES = 40
+MASSLESS = "its interfaces have no mass, so that a stop has no equation of motion"
+MOVED = 1.001  # times an orbit: the start from which the time of Newton's method is measured
+VISIBLE = 1e-6  # of the largest displacement at an interface: that of a mode which is seen there
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What one reduced model answers.
+
+    Parameters
+    ----------
+    mesh, method : str
+        Name of the mesh, empty where there is one only, and how it was reduced.
+    dofs, modes, size : int
+        Degrees of freedom of the component, kept component modes, modal coordinates of the system.
+    frequencies_hz : (k,) array
+        Lowest eigenfrequencies that an interface sees.
+    receptance : (f,) complex array
+        Linear receptance at the observed interface over the range, with all dampers, m/N.
+    peak : Orbit or None
+        Orbit at the top of the highest resonance peak of the harmonic branch.
+    special_hz : dict of str to tuple
+        Frequencies of the folds (LP) and flips (PD) of the harmonic branch.
+    orbit : Orbit or None
+        Harmonic orbit at the frequency of the study.
+    seconds_per_orbit : float
+        Time to find that orbit again from a guess 0.1 % off, the shortest of nine.
+    seconds : float
+        Time for the branch.
+    note : str
+        What could not be computed.
+    """
+
+    mesh: str
+    method: str
+    dofs: int
+    modes: int
+    size: int
+    frequencies_hz: Real
+    receptance: Complex
+    peak: Orbit | None
+    special_hz: Mapping[str, tuple[float, ...]] | None
+    orbit: Orbit | None
+    seconds_per_orbit: float
+    seconds: float
+    note: str = ""
+
+    @property
+    def label(self) -> str:
+        """Mesh and method."""
+        return " ".join(filter(None, (self.mesh, self.method)))
+
+    def __repr__(self) -> str:
+        """One line: mesh, method and how many modes are kept."""
+        return f"<Measured {self.label}, {counted_modes(self)}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Relative errors of one model against the reference; nan where a number is missing.
+
+    Parameters
+    ----------
+    eigenfrequency : float
+        Largest of the first three that an interface sees, or of as many as the model has.
+    receptance : float
+        ``norm(H - H_ref) / norm(H_ref)`` over the range.
+    peak_hz, peak_m : float
+        Frequency and height of the highest resonance peak.
+    fold_flip : float
+        Largest error of a fold's or flip's frequency, of those that both models have; nan if there
+        are none.
+    counts : (int, int) or None
+        Folds and flips of the reference that the model lacks, and the other way round; None if
+        it has no branch.
+    force, contact : float
+        Largest contact force and whole contact time per period of the orbit at the frequency of
+        the study.
+    """
+
+    eigenfrequency: float
+    receptance: float
+    peak_hz: float
+    peak_m: float
+    fold_flip: float
+    counts: tuple[int, int] | None
+    force: float
+    contact: float
+
+
+def counted_modes(model: Measured) -> str:
+    """How many modes a model keeps, in words."""
+    return f"{model.modes} mode{'' if model.modes == 1 else 's'}"
+
+
+def most_modes(component: cms.ComponentLike, methods: Sequence[str]) -> int:
+    """How many modes a component has by each of some methods: those with mass, less the held."""
+    pencil = checked_pencil(component)
+    held = len(pencil.names) if "craig-bampton" in methods else 0
+    return max(pencil.size - int(pencil.massless.shape[1]) - held, 1)
+
+
+def best_of(models: Sequence[Measured], full: Measured) -> Measured:
+    """Of the models whose branch was followed the largest, of several that with least error."""
+    followed = [model for model in models if model.special_hz is not None]
+    if not followed:
+        raise ConvergenceError("no model of the study has a harmonic branch: " + models[-1].note)
+    return min(followed, key=lambda m: (-m.size, distance(m.receptance, full.receptance)))
+
+
+def measured(
+    mesh: str,
+    reduced: cms.ReducedModel,
+    setting: LoadCase,
+    at_hz: float,
+    progress: Progress = silent,
+) -> Measured:
+    """Compute what a `ConvergenceStudy` compares for one reduced model."""
+    linear = measured_linear(mesh, reduced.method, reduced, setting)
+    if reduced.has_massless_part:
+        return replace(linear, note=MASSLESS)
+    start = time.perf_counter()
+    try:
+        what = f"{linear.label}, {counted_modes(linear)}"
+        tell = told(progress, what, setting.range_hz)
+        branch = harmonic_branch(setting.system(reduced), setting, tell)
+    except ConvergenceError as error:
+        return replace(linear, note=str(error))
+    seconds = time.perf_counter() - start
+    peaks = resonance_peaks(branch)
+    orbits = branch.at(at_hz)
+    return replace(
+        linear,
+        peak=max(peaks, key=lambda p: p.height).orbit if peaks else None,
+        special_hz=special_points_of(branch),
+        orbit=orbits[0] if orbits else None,
+        seconds_per_orbit=seconds_per_orbit(orbits[0]) if orbits else np.nan,
+        seconds=seconds,
+        note="; ".join(branch.notes),
+    )
+
+
+def measured_linear(
+    mesh: str, method: str, reduced: cms.ReducedModel, setting: LoadCase
+) -> Measured:
+    """Counts, visible eigenfrequencies and receptance of a model."""
+    rows = np.array(list(reduced.participation.values()))
+    seen = np.any(np.abs(rows) > VISIBLE * np.abs(rows).max(axis=1, keepdims=True), axis=0)
+    return Measured(
+        mesh,
+        method,
+        dofs=int(reduced.basis.shape[0]),
+        modes=reduced.modes,
+        size=reduced.size,
+        frequencies_hz=np.sort(reduced.frequencies_hz[seen]),
+        receptance=receptance(reduced, setting, np.linspace(*setting.range_hz, GRID)),
+        peak=None,
+        special_hz=None,
+        orbit=None,
+        seconds_per_orbit=np.nan,
+        seconds=np.nan,
+    )
+
+
+def reductions(
+    component: cms.ComponentLike, counts: Sequence[int], method: str
+) -> list[cms.ReducedModel]:
+    """Models by one method with ascending counts; those by Rubin's lie in the largest."""
+    if method == "guyan":
+        return [cms.reduce(component, method=method)]
+    if method != "rubin":
+        return [cms.reduce(component, modes=count, method=method) for count in counts]
+    largest = cms.reduce(component, modes=counts[-1])
+    fewer = [cms.keep_modes(largest, range(1, count + 1)) for count in counts[:-1]]
+    return [*fewer, largest]
+
+
+def reference_model(component: cms.ComponentLike, modes: int) -> cms.ReducedModel:
+    """All modes of a component that an interface sees; of a large one more than a study's."""
+    size = int(component.mass.shape[0])
+    if size <= ALL_MODES_UP_TO:
+        count = most_modes(component, ())
+        return visible_modes(cms.reduce(component, modes=count, method="truncation"))
+    return cms.reduce(component, modes=min(max(2 * modes, FEWEST_REFERENCE_MODES), size))
+
+
+def is_full(reference: cms.ReducedModel) -> bool:
+    """Whether a `reference_model` is the full model."""
+    return reference.method == "truncation"
+
+
+def receptance_bound(
+    component: cms.ComponentLike, whole: cms.ReducedModel, linear: Measured, setting: LoadCase
+) -> float:
+    """Bound of the error of a model's undamped receptance over the range, as in `Errors`."""
+    observed = setting.observe or whole.interfaces[0]
+    grid = np.linspace(*setting.range_hz, GRID)
+    band = cms.accuracy(component, whole).receptance_error(grid, observed, observed)
+    return float(np.linalg.norm(np.abs(band).max(axis=1)) / np.linalg.norm(linear.receptance))
+
+
+def with_orbit(
+    model: Measured,
+    reduced: cms.ReducedModel,
+    setting: LoadCase,
+    guess: Orbit,
+    progress: Progress,
+) -> Measured:
+    """The full model with its orbit, found from that of a reduced one."""
+    progress(f"full model, {reduced.size} modes", guess.frequency_hz, 0.0)
+    try:
+        orbit = transferred(guess, setting.system(reduced))
+    except ConvergenceError as error:
+        return replace(model, note=str(error))
+    return replace(model, orbit=orbit, seconds_per_orbit=seconds_per_orbit(orbit, repeats=1))
+
+
+def visible_modes(reduced: cms.ReducedModel) -> cms.ReducedModel:
+    """The model without the modes that no interface sees."""
+    rows = np.array(list(reduced.participation.values()))
+    seen = np.any(np.abs(rows) > INVISIBLE * np.abs(rows).max(axis=1, keepdims=True), axis=0)
+    return replace(
+        reduced,
+        frequencies_hz=reduced.frequencies_hz[seen],
+        participation={name: row[seen] for name, row in reduced.participation.items()},
+        basis=reduced.basis[:, seen],
+        residuals=reduced.residuals[seen],
+        modes=int(np.count_nonzero(seen[: reduced.modes])),
+        damping=None if reduced.damping is None else reduced.damping[np.ix_(seen, seen)],
+    )
+
+
+def transferred(guess: Orbit, system: System) -> Orbit:
+    """The orbit of another model of the same component at the frequency of a known one.
+
+    The modes of the models correspond by the order of their frequencies, as far as the known
+    model has them; the others start at rest. Its coordinates are those of free-interface modes.
+    """
+    small, large = guess.system.size, system.size
+    known = np.array(
+        [int(np.argmin(np.abs(system.frequencies_hz - hz))) for hz in guess.system.frequencies_hz]
+    )
+    states = guess.problem.flow.to_modal(guess.problem.nodes(guess.point))
+    first = guess.system.interfaces[0]
+    alike = np.sign(guess.system.participation[first] * system.participation[first][known])
+    start = np.zeros((states.shape[0], 2 * large))
+    start[:, known] = states[:, :small] * alike
+    start[:, large + known] = states[:, small:] * alike
+    return solve_orbit(
+        system,
+        guess.frequency_hz,
+        guess.period,
+        guess=start,
+        observe=guess.observe,
+        segments=guess.problem.segments,
+    )
+
+
+def receptance(reduced: cms.ReducedModel, setting: LoadCase, frequency_hz: Real) -> Complex:
+    """Linear receptance (f,) at the observed interface, with all dampers."""
+    if reduced.has_massless_part:
+        return massless_receptance(reduced, setting, frequency_hz)
+    system = setting.system(reduced)
+    row = next(iter(system.participation.values()))
+    squares, D = system.natural_frequencies**2, system.total_damping
+    if not np.any(D - np.diag(np.diag(D))) and not system.springs:
+        omega = 2 * np.pi * frequency_hz[:, None]
+        return np.asarray(np.sum(row**2 / (squares - omega**2 + 1j * omega * np.diag(D)), axis=1))
+    found = [
+        row @ np.linalg.solve(system.stiffness - w**2 * np.eye(row.size) + 1j * w * D, row)
+        for w in 2 * np.pi * frequency_hz
+    ]
+    return np.array(found)
+
+
+def massless_receptance(
+    reduced: cms.ReducedModel, setting: LoadCase, frequency_hz: Real
+) -> Complex:
+    """The same where part of the flexibility has no mass.
+
+    Dampers and springs close R = P Z^-1 P^T + G.
+    """
+    if any(setting.rayleigh):  # not known where flexibility has no mass
+        return np.full(len(frequency_hz), np.nan, dtype=complex)
+    names = reduced.interfaces
+    observed = names.index(setting.observe or names[0])
+    R = np.array(
+        [
+            [reduced.receptance(frequency_hz, a, b, setting.modal_damping) for b in names]
+            for a in names
+        ]
+    )
+    C, K = np.zeros((2, len(names), len(names)))
+    linear = [d for d in setting.dampers if isinstance(d, Damper)]
+    sizes = [(C, d.coefficient, d.at, d.against) for d in linear]
+    springs = [s for s in setting.springs if isinstance(s, Spring)]
+    sizes += [(K, s.stiffness, s.at, s.against) for s in springs]
+    for matrix, size, at, against in sizes:
+        ends = [1.0 * (name == at) - (name == against) for name in names]
+        matrix += size * np.outer(ends, ends)
+    found = [
+        np.linalg.solve(np.eye(len(names)) + R[:, :, k] @ (K + 1j * w * C), R[:, observed, k])[
+            observed
+        ]
+        for k, w in enumerate(2 * np.pi * frequency_hz)
+    ]
+    return np.array(found)
+
+
+def harmonic_branch(system: System, setting: LoadCase, tell: Callable[[float], None]) -> Branch:
+    """The harmonic branch downwards from the upper end of the range."""
+    low, high = setting.range_hz
+    tell(high)
+    try:
+        orbit = solve_orbit(
+            FlowMap(system), high * (1.0 - SLACK), observe=setting.observe, seconds=LONGEST_SEARCH
+        )
+    except ConvergenceError as error:
+        rigid = system.free_modes
+        if not rigid:
+            raise
+        modes = f"{rigid} mode{'' if rigid == 1 else 's'} at 0 Hz"
+        raise ConvergenceError(f"{error}; nothing holds the structure: it has {modes}") from None
+    return continue_branch(orbit, (low, high), progress=tell)
+
+
+def told(progress: Progress, what: str, range_hz: tuple[float, float]) -> Callable[[float], None]:
+    """Tell how much of a range a branch covers that comes down from its upper end."""
+    low, high = range_hz
+    lowest = high
+
+    def tell(frequency_hz: float) -> None:
+        nonlocal lowest
+        lowest = min(lowest, frequency_hz)
+        progress(what, frequency_hz, (high - lowest) / (high - low))
+
+    return tell
+
+
+def seconds_per_orbit(orbit: Orbit, repeats: int = 9) -> float:
+    """Time to find an orbit again from states 0.1 % off, the shortest of some repeats."""
+    problem, times = orbit.problem, []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        refine(problem, problem.nodes(orbit.point) * MOVED, orbit.omega, orbit.observe)
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def contact_time(orbit: Orbit) -> float:
+    """Time in s per period of the orbit during which a stop is touched."""
+    _, weights = orbit.trajectory.contact_quadrature()
+    return float(np.sum(weights))
+
+
+def largest_force(orbit: Orbit) -> float:
+    """Largest contact force in N over a period."""
+    return max((impact.force for impact in orbit.impact_list), default=0.0)
+
+
+def errors_of(model: Measured, reference: Measured, best: Measured, full: bool) -> Errors:
+    """Errors of a model: linear numbers against the reference, the branch's against ``best``.
+
+    The orbit is compared with that of the full model if there is one.
+    """
+    eigenfrequency = frequency_error(model.frequencies_hz, reference.frequencies_hz)
+    fold_flip, counts = np.nan, None
+    if model.special_hz is not None and best.special_hz is not None:
+        fold_flip, *lacking = matched(model.special_hz, best.special_hz)
+        counts = (lacking[0], lacking[1])
+        if lacking[0] == sum(map(len, best.special_hz.values())):
+            fold_flip = np.nan
+    orbit = reference.orbit if full else best.orbit
+    return Errors(
+        eigenfrequency,
+        distance(model.receptance, reference.receptance),
+        relative(model.peak, best.peak, lambda o: o.frequency_hz),
+        relative(model.peak, best.peak, lambda o: o.max_abs_displacement),
+        fold_flip,
+        counts,
+        relative(model.orbit, orbit, largest_force),
+        relative(model.orbit, orbit, contact_time),
+    )
+
+
+def frequency_error(own: Real, exact: Real) -> float:
+    """Largest relative error of the first three frequencies, or of as many as the model has.
+
+    That of a rigid-body mode is relative to the first frequency above zero. nan if there are none.
+    """
+    count = min(EIGENFREQUENCIES, exact.size, own.size)
+    if not count:
+        return np.nan
+    elastic = exact[exact > 0.0]
+    scale = np.where(exact > 0.0, exact, elastic[0] if elastic.size else 1.0)
+    return float(np.max(np.abs(own[:count] - exact[:count]) / scale[:count]))
+
+
+def distance(given: Complex, known: Complex) -> float:
+    """Relative distance of a function on the grid from a known one."""
+    return float(np.linalg.norm(given - known) / np.linalg.norm(known))
+
+
+def relative(a: Orbit | None, b: Orbit | None, number: Callable[[Orbit], float]) -> float:
+    """Relative difference of a number of two orbits; nan where one is missing, or b's is zero."""
+    exact = 0.0 if b is None else number(b)
+    return abs(number(a) - exact) / abs(exact) if a is not None and exact else np.nan
+
+
+def special_points_of(branch: Branch) -> dict[str, tuple[float, ...]]:
+    """Frequencies of the folds and flips of a branch, by kind."""
+    return {
+        kind: tuple(sorted(p.frequency_hz for p in branch.special_points if str(p.kind) == kind))
+        for kind in SPECIAL_KINDS
+    }
+
+
+def matched(
+    own: Mapping[str, tuple[float, ...]], exact: Mapping[str, tuple[float, ...]]
+) -> tuple[float, int, int]:
+    """Largest relative distance of special points that belong together, and how many do not.
+
+    Points of one kind are paired nearest first, up to a distance of 2 %.
+    """
+    worst, missing, extra = 0.0, 0, 0
+    for kind, wanted in exact.items():
+        given = own.get(kind, ())
+        pairs = sorted((abs(g / w - 1.0), i, j) for i, w in enumerate(wanted)
+                       for j, g in enumerate(given))  # fmt: skip
+        left, right = set(range(len(wanted))), set(range(len(given)))
+        for distance, i, j in pairs:
+            if distance > MATCH or i not in left or j not in right:
+                continue
+            left.remove(i)
+            right.remove(j)
+            worst = max(worst, distance)
+        missing += len(left)
+        extra += len(right)
+    return worst, missing, extra
