@@ -7,7 +7,8 @@ from fem.assembly.summary import MassProperties, mass_properties, summary
 from fem.base.errors import JointWarning, ModelError
 from fem.checks.unlikely import UnlikelyWarning
 from fem.formats.abaqus import read_abaqus
-from fem.formats.read import from_meshio, read_mesh, read_structure, structure_from_meshio
+from fem.formats.from_meshio import from_meshio, structure_from_meshio
+from fem.formats.read import read_mesh, read_structure
 from fem.formats.write import write_mesh
 from fem.mesh.attachments import (
     Attachments,

@@ -146,7 +146,7 @@ FAULTS = [
     ),
     Fault(
         "wedges of a file are left out",
-        "fem/formats/read.py",
+        "fem/formats/from_meshio.py",
         "        blocks = cells.setdefault(block.type, [])",
         '        if block.type == "wedge":\n            continue\n'
         "        blocks = cells.setdefault(block.type, [])",

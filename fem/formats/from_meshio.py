@@ -1,0 +1,268 @@
+"""Meshes of frames and structures from those of meshio."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TypeVar
+
+import meshio
+import numpy as np
+from numpy.typing import ArrayLike
+
+import fem.formats.meshio_kinds  # noqa: F401  (completes meshio's tables)
+from fem.base.arrays import FloatArray, IntArray
+from fem.base.errors import ModelError, quoted
+from fem.formats.collapsed import uncollapsed
+from fem.formats.ignored import SET_PREFIX, TYPE_PREFIX
+from fem.mesh.cells import KINDS, SPANS
+from fem.mesh.frame_mesh import FrameMesh
+from fem.mesh.structure_mesh import StructureMesh
+
+Named = TypeVar("Named")
+FARTHEST = 1e50
+ASIDE = 1e-6  # of its length: how far the middle node of a straight line may lie beside it
+
+
+def from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> FrameMesh:
+    """Take lines, parts and points out of a `meshio.Mesh`; see `read_mesh` for the conventions.
+
+    Examples
+    --------
+    >>> import meshio
+    >>> content = meshio.Mesh(
+    ...     [[0.0, 0.0], [1.0, 0.0]], [("line", [[0, 1]])],
+    ...     cell_data={"set:rod": [[1]]}, point_data={"set:tip": [0, 1]},
+    ... )
+    >>> from_meshio(content).parts
+    {'rod': array([0])}
+    """
+    points = _three_coordinates(content, source)
+    lines, parts = _lines_and_parts(content, source)
+    _check_far(points, source)
+    _check_nodes("line", lines, len(points), source)
+    used = np.unique(lines)
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
+    sets = {name: number[nodes] for name, nodes in _point_sets(content, source).items()}
+    parts = {name: elements for name, elements in parts.items() if len(elements)}
+    return FrameMesh(
+        points[used],
+        number[lines],
+        _names(parts),
+        {name: nodes[nodes >= 0] for name, nodes in sets.items()},
+        source,
+        element_types=_types(parts),
+    )
+
+
+def structure_from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> StructureMesh:
+    """Take cells, groups and points of all kinds out of a `meshio.Mesh`.
+
+    Examples
+    --------
+    >>> import meshio
+    >>> content = meshio.Mesh(
+    ...     [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [("triangle", [[0, 1, 2]])],
+    ...     cell_data={"set:sheet": [[1]]},
+    ... )
+    >>> structure_from_meshio(content).part("sheet")
+    {'triangle': array([0])}
+    """
+    points = _three_coordinates(content, source)
+    _check_kinds(
+        content,
+        {*KINDS, "vertex"},
+        source,
+        f"known are {quoted(KINDS)}; or ignore these by their names",
+    )
+    cells: dict[str, list[IntArray]] = {}
+    groups: dict[str, dict[str, list[IntArray]]] = {}
+    for index, block in enumerate(content.cells):
+        if block.type == "vertex" or not len(block.data):
+            continue
+        blocks = cells.setdefault(block.type, [])
+        first = sum(len(data) for data in blocks)
+        for name, found in _groups(content, index, KINDS[block.type].dimension, source):
+            groups.setdefault(name, {}).setdefault(block.type, []).append(found + first)
+        blocks.append(np.asarray(block.data, dtype=np.int64))
+    if not cells:
+        vertices = sum(len(block.data) for block in content.cells)
+        raise ModelError(
+            f"{source}: the mesh has no cells (it has {len(points)} nodes and {vertices} vertices)"
+        )
+    _check_far(points, source)
+    nodes_of = {kind: np.concatenate(blocks) for kind, blocks in cells.items()}
+    for kind, nodes in nodes_of.items():
+        _check_nodes(kind, nodes, len(points), source)
+    whole, named, notes = uncollapsed(
+        points,
+        nodes_of,
+        {
+            name: {kind: np.concatenate(found) for kind, found in group.items()}
+            for name, group in groups.items()
+            if any(len(cells) for found in group.values() for cells in found)
+        },
+        source,
+    )
+    sets = {name: nodes for name, nodes in _point_sets(content, source).items() if len(nodes)}
+    return StructureMesh(
+        points, whole, _names(named), sets, source, notes=notes, element_types=_types(named)
+    )
+
+
+def _check_kinds(content: meshio.Mesh, taken: set[str], source: str, advice: str) -> None:
+    """Refuse cells that would be left out, by their kinds, blocks and groups."""
+    found: dict[str, list[int]] = {}
+    for index, block in enumerate(content.cells):
+        if block.type not in taken and len(block.data):
+            found.setdefault(block.type, []).append(index)
+    if not found:
+        return
+    told = []
+    for kind, blocks in found.items():
+        count = sum(len(content.cells[index].data) for index in blocks)
+        dimension = content.cells[blocks[0]].dim
+        names = {n for i in blocks for n, at in _groups(content, i, dimension, source) if len(at)}
+        group = f"in {quoted(sorted(names))}" if names else "in no group"
+        number = ", ".join(map(str, blocks[:5])) + (", ..." if len(blocks) > 5 else "")
+        told.append(f"{count} {kind} ({group}; block {number} of the file, counted from 0)")
+    raise ModelError(f"{source}: the mesh has cells that are not read: {'; '.join(told)}; {advice}")
+
+
+def _names(groups: Mapping[str, Named]) -> dict[str, Named]:
+    """The groups that a file names."""
+    return {name: found for name, found in groups.items() if not name.startswith(TYPE_PREFIX)}
+
+
+def _types(groups: Mapping[str, Named]) -> dict[str, Named]:
+    """The groups that hold the elements of one type, by the name of the type."""
+    return {
+        name.removeprefix(TYPE_PREFIX): found
+        for name, found in groups.items()
+        if name.startswith(TYPE_PREFIX)
+    }
+
+
+def _check_far(points: FloatArray, source: str) -> None:
+    bad = np.flatnonzero(~(np.abs(points) < FARTHEST).all(axis=1))
+    if len(bad):
+        raise ModelError(
+            f"{source}: the coordinates of node {bad[0]} (counted from 0) are not finite numbers"
+            f" below {FARTHEST:g} m"
+        )
+
+
+def _check_nodes(what: str, nodes: IntArray, count: int, source: str) -> None:
+    """Refuse nodes that are not there, which numpy would count from the end."""
+    if not len(nodes):
+        return
+    bad = np.flatnonzero(((nodes < 0) | (nodes >= count)).reshape(len(nodes), -1).any(axis=1))
+    if len(bad):
+        raise ModelError(f"{source}: {what} {bad[0]} (counted from 0) has a node that is not there")
+
+
+def _three_coordinates(content: meshio.Mesh, source: str) -> FloatArray:
+    points = np.asarray(content.points, dtype=np.float64)
+    if points.ndim != 2 or not 1 <= points.shape[1] <= 3:
+        raise ModelError(f"{source}: the mesh is empty (no points)")
+    return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+
+
+def _lines_and_parts(content: meshio.Mesh, source: str) -> tuple[IntArray, dict[str, IntArray]]:
+    curved = sorted({b.type for b in content.cells if b.type.startswith("line")} - set(SPANS))
+    if curved:
+        raise ModelError(
+            f"{source}: elements of type {quoted(curved)} are not straight two-node lines;"
+            " make the mesh of first order"
+        )
+    advice = "a frame has lines only; read it as a structure, or ignore these by their names"
+    if any(block.type in SPANS and len(block.data) for block in content.cells):
+        _check_kinds(content, {*SPANS, "vertex"}, source, advice)
+    lines: list[IntArray] = []
+    parts: dict[str, list[IntArray]] = {}
+    first = 0
+    for index, block in enumerate(content.cells):
+        if block.type in SPANS and len(block.data):
+            pieces = straight_pieces(content, block.type, block.data, source)
+            count = len(SPANS[block.type])
+            for name, elements in _groups(content, index, 1, source):
+                halves = count * elements[:, None] + np.arange(count)
+                parts.setdefault(name, []).append(halves.ravel() + first)
+            lines.append(pieces)
+            first += len(pieces)
+    if not lines:
+        found = sorted({block.type for block in content.cells if len(block.data)})
+        raise ModelError(f"{source}: the mesh has no line elements (its cells are {quoted(found)})")
+    return np.concatenate(lines), {name: np.concatenate(p) for name, p in parts.items()}
+
+
+def straight_pieces(content: meshio.Mesh, kind: str, cells: ArrayLike, source: str) -> IntArray:
+    """Two-node lines (e, 2) of lines with two or three nodes; a curved one is refused."""
+    nodes = np.asarray(cells, dtype=np.int64)
+    _check_nodes(kind, nodes, len(content.points), source)
+    if kind == "line3":
+        points = _three_coordinates(content, source)[nodes]
+        span, arm = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
+        square = np.sum(span**2, axis=1)
+        share = np.sum(span * arm, axis=1) / np.where(square > 0.0, square, np.inf)
+        aside = np.linalg.norm(arm - share[:, None] * span, axis=1)
+        bad = np.flatnonzero((aside > ASIDE * np.sqrt(square)) | (np.abs(share - 0.5) >= 0.5))
+        if len(bad):
+            raise ModelError(
+                f"{source}: line3 {bad[0]} (counted from 0) is not straight; a frame has straight"
+                " beams: make the mesh of first order, or use a structure, where a line of three"
+                " nodes is two beams"
+            )
+    return np.stack([nodes[:, list(ends)] for ends in SPANS[kind]], axis=1).reshape(-1, 2)
+
+
+def _point_sets(content: meshio.Mesh, source: str) -> dict[str, IntArray]:
+    sets: dict[str, list[IntArray]] = {}
+    for name, nodes in content.point_sets.items():
+        sets.setdefault(str(name), []).append(np.asarray(nodes, dtype=np.int64))
+    for name, values in content.point_data.items():
+        if name.startswith(SET_PREFIX):
+            sets.setdefault(_set_name(name), []).append(_marked(name, values, source))
+    for index, block in enumerate(content.cells):
+        if block.type == "vertex":
+            for name, vertices in _groups(content, index, 0, source):
+                sets.setdefault(name, []).append(block.data[vertices].ravel())
+    found = {name: np.unique(np.concatenate(nodes)) for name, nodes in sets.items()}
+    for name, nodes in found.items():
+        _check_nodes(f"point {name!r}", nodes, len(content.points), source)
+    return found
+
+
+def _marked(array: str, values: ArrayLike, source: str) -> IntArray:
+    """Indices where an array ``set:NAME`` is 1; elsewhere it is 0."""
+    marks = np.asarray(values).ravel()
+    bad = np.flatnonzero((marks != 0) & (marks != 1))
+    if len(bad):
+        raise ModelError(f"{source}: array {array!r} holds {marks[bad[0]]}, but 0 or 1 is expected")
+    return np.flatnonzero(marks)
+
+
+def _groups(
+    content: meshio.Mesh, index: int, dimension: int, source: str
+) -> Iterator[tuple[str, IntArray]]:
+    """Names and cell indices of all groups in one block of cells."""
+    for name, blocks in content.cell_sets.items():
+        if not name.startswith("gmsh:") and index < len(blocks) and len(blocks[index]):
+            yield str(name), np.asarray(blocks[index], dtype=np.int64)
+    for name, blocks in content.cell_data.items():
+        if name.startswith(SET_PREFIX):
+            yield _set_name(name), _marked(name, blocks[index], source)
+    tags = np.asarray(content.cell_data.get("gmsh:physical", {index: []})[index])
+    for tag in np.unique(tags[tags != 0]):
+        yield _physical_name(content, int(tag), dimension), np.flatnonzero(tags == tag)
+
+
+def _physical_name(content: meshio.Mesh, tag: int, dimension: int) -> str:
+    for name, (number, its_dimension) in content.field_data.items():
+        if (number, its_dimension) == (tag, dimension):
+            return str(name)
+    return str(tag)
+
+
+def _set_name(array: str) -> str:
+    return array.removeprefix(SET_PREFIX)
