@@ -18,6 +18,7 @@ from nldyn.bifurcations.sign_changes import changed, leaves_circle, tests
 from nldyn.bifurcations.touching import touches_sharply, touching_extremes
 from nldyn.orbits.critical_functions import travel
 from nldyn.orbits.extremes import dip, extreme_dip
+from nldyn.orbits.impact_phases import impacts_by_segment
 from nldyn.orbits.shooting import metric_length
 
 FAR = 0.1  # way of a multiplier near the unit circle within which it does not cross it twice
@@ -71,9 +72,13 @@ def passes_node(a: BranchNode, b: BranchNode) -> bool:
 
     The state there jumps to that on the other side of the impact, over a step of no length.
     """
+    if not a.orbit.system.jumps:
+        return False
     weights = a.orbit.problem.metric(a.orbit.point)
     way = metric_length(weights, b.orbit.point - a.orbit.point)
-    return a.orbit.system.jumps and way > MOST_BENT * abs(b.arclength - a.arclength)
+    if way > MOST_BENT * abs(b.arclength - a.arclength):
+        return True
+    return bool((impacts_by_segment(a.orbit) != impacts_by_segment(b.orbit)).any())
 
 
 def _inside(

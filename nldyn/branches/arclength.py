@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -24,13 +24,17 @@ from nldyn.bifurcations.period_doubling import flip_between, half_difference, pa
 from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.sign_changes import crosses
 from nldyn.bifurcations.touching import rigid_grazing, rigid_touches
-from nldyn.bifurcations.within_step import passes_node
+from nldyn.bifurcations.within_step import differs, passes_node
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.predictor import predicted
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.bordered import Free, OrbitFamily, correct, length_unit
 from nldyn.orbits.conditions import TOUCH, depth_row
-from nldyn.orbits.impact_phases import impact_behind_node, start_far_from_impacts
+from nldyn.orbits.impact_phases import (
+    impact_behind_node,
+    impacts_by_segment,
+    start_far_from_impacts,
+)
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import FROM_NEAR, ShootingProblem, asymmetry, metric_length, shifts
 from nldyn.system.chart import FREQUENCY, Chart
@@ -46,6 +50,8 @@ FARTHEST_CROSSING = 1e-4  # distance of one from which a step may begin
 GRAZES = 1e-4  # depth over size at which a walk that cannot go on is at a grazing of a rigid stop
 SLIGHTEST = 1e-6  # impact with one that is followed: multipliers go with its inverse
 NEAR_NODE = 1e-4  # phase from an impact to one of shooting from which a walk may pass it
+FARTHEST_NODE = 0.3  # the same for a step that is not short
+FASTEST = 20.0  # change of an impact's phase with the arclength, at most, in rad
 AT_NODE = 1e-7  # the same that is too near
 PAST_NODE = 1e-6, 1e-5, 1e-4, 1e-3  # steps over it
 MOST_BEHIND = 4  # points behind the last one that tell where a branch goes on
@@ -117,15 +123,18 @@ def grazing_between(a: Orbit, b: Orbit) -> bool:
     return first != last
 
 
-def _past_impact_at_node(here: BranchNode) -> tuple[BranchNode, float, float] | None:
+def _past_impact_at_node(
+    here: BranchNode, shifts: Sequence[float], near: float
+) -> tuple[BranchNode, float, float] | None:
     """Next point where the phase of an impact with a rigid stop passes one of shooting, or None.
 
     The state there jumps from that before the impact to that behind it, or back. So the orbit is
-    solved for by its states at other phases.
+    solved for by its states at other phases, a step ahead, the first of `shifts` that leads on. The
+    phase must be as near as told.
     """
     orbit, problem = here.orbit, here.orbit.problem
     before = impact_behind_node(orbit)
-    if abs(before) > NEAR_NODE:
+    if abs(before) > near:
         return None
     hz = orbit.frequency_hz
     chart = Chart(Parameter(FREQUENCY), 0.5 * hz, 2.0 * hz)
@@ -134,13 +143,14 @@ def _past_impact_at_node(here: BranchNode) -> tuple[BranchNode, float, float] | 
     by_frequency[-1] = math.copysign(1.0, here.tangent[-1])
     try:
         guess = family.unknowns(orbit)
-        for shift in PAST_NODE:
+        for shift in shifts:
             guess[-1] = chart.coordinate(hz * math.exp(shift * float(here.tangent[-1])))
             met = correct(family, guess, Free(), np.abs(by_frequency), float(guess[-1]))
             if not met.converged:
                 continue
             behind = impact_behind_node(met.orbit)
-            if abs(behind) < AT_NODE or (abs(before) > AT_NODE and before * behind > 0.0):
+            stays = (impacts_by_segment(met.orbit) == impacts_by_segment(orbit)).all()
+            if abs(behind) < AT_NODE or (stays and abs(before) > AT_NODE and before * behind > 0.0):
                 continue
             found = problem.correct(
                 met.orbit.point, by_frequency, longest=NEAR_NODE, max_iterations=FROM_NEAR
@@ -150,7 +160,9 @@ def _past_impact_at_node(here: BranchNode) -> tuple[BranchNode, float, float] | 
                 change = other.max_abs_displacement / orbit.max_abs_displacement - 1.0
                 if other.impacts == orbit.impacts and abs(change) < 100.0 * shift + NEAR_NODE:
                     tangent = problem.tangent(found, by_frequency)
-                    return BranchNode(other, tangent, here.arclength + shift), 0.0, 0.0
+                    there = BranchNode(other, tangent, here.arclength + shift)
+                    if not differs(here, there):
+                        return there, 0.0, 0.0
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
         pass
     return None
@@ -248,6 +260,7 @@ class Stepper:
             bent = step <= KINK and (
                 point.orbit.impacts != here.orbit.impacts or point.orbit.system.jumps
             )
+            bent = bent or passes_node(here, point)
             step = self.options.next_step(step, angle, miss)
             trail = np.vstack([here.orbit.point, here.tangent, behind])
             behind = trail[: 0 if bent else 2 * MOST_BEHIND]
@@ -276,6 +289,8 @@ class Stepper:
             attempt = self._advance(problem, behind, here, step)
             if attempt is None and step <= KINK:
                 attempt = self._across_touch(problem, here, step)
+            elif attempt is None and problem.flow.system.jumps:
+                attempt = _past_impact_at_node(here, (step,), min(FARTHEST_NODE, FASTEST * step))
             if attempt is None and step <= MEETING_STEP and self._met == 2.0 * step:
                 step, self._met = self._met, 0.0  # shorter, it ends too near to the flip
                 attempt = self._advance(problem, behind, here, step, step)
@@ -284,7 +299,8 @@ class Stepper:
             step *= 0.5
             if not tried and self.options.min_step <= step < SHORTEST_CROSSING:
                 tried = True
-                attempt = _past_impact_at_node(here) or self._past_crossing(here)
+                attempt = _past_impact_at_node(here, PAST_NODE, NEAR_NODE)
+                attempt = attempt or self._past_crossing(here)
                 if attempt is not None:
                     return attempt[0].arclength - here.arclength, *attempt
         return None

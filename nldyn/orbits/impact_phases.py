@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.flow.rigid import rigid_impacts
@@ -39,6 +40,13 @@ def impact_behind_node(orbit: Orbit) -> float:
 def nodes_to_impacts(orbit: Orbit) -> float:
     """Least distance in rad of impacts with rigid stops from phases of shooting."""
     return abs(impact_behind_node(orbit))
+
+
+def impacts_by_segment(orbit: Orbit) -> NDArray[np.intp]:
+    """Number of impacts with rigid stops in each segment of shooting, (k,)."""
+    problem = orbit.problem
+    segment = np.searchsorted(problem.phases, _impact_phases(orbit), side="right") - 1
+    return np.bincount(np.clip(segment, 0, None), minlength=problem.segments)
 
 
 def start_far_from_impacts(orbit: Orbit) -> float:

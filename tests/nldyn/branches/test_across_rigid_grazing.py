@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from event_driven import PiecewiseLinear
 from one_impact import OneImpact
 
 from nldyn import HarmonicForce, RigidStop, System, continue_branch, impacts, solve_orbit
@@ -88,3 +89,22 @@ def test_two_stops_grazed_at_once_end_a_branch():
     )
     assert branch.stop_reasons[0].ending is Ending.GRAZES_RIGID
     assert branch.special_points[0].kind == "GR"
+
+
+def test_a_branch_with_rest_steps_over_all_impacts_that_pass_a_phase_of_shooting():
+    """Some 60 impacts a period pass it one after another; each orbit comes back to its state."""
+    matrices, force = ([[1.0]], [[1.0]], [[0.1]]), [1.0]
+    system = system_of(matrices, force, [RigidStop("x0", RESTITUTION, GAP)])
+    branch = continue_branch(solve_orbit(system, 0.035), (0.033, 0.039))
+    assert not branch.notes
+    assert len(branch.points) < 60
+    for orbit in branch.points[:: max(len(branch.points) // 3, 1)]:
+        exact = PiecewiseLinear(
+            *map(np.array, matrices), np.array(force), np.zeros(1), [([1.0], GAP, RESTITUTION)],
+            orbit.omega,
+        )  # fmt: skip
+        state = orbit.problem.flow.to_modal(orbit.problem.nodes(orbit.point)[:1])[0]
+        state = state * system.participation["x0"][0]
+        end, _, rested = exact.run(state, TURN / orbit.omega)
+        assert rested > 0.1 * TURN / orbit.omega
+        assert np.abs(end - state).max() < 1e-9
