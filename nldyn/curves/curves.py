@@ -33,7 +33,8 @@ from nldyn.curves.marks import (
     grazing_at_end,
     marks_between,
 )
-from nldyn.curves.walk import CurvePoint, CurveWalk, curve_point, passages
+from nldyn.curves.point import CurvePoint, curve_point, passages
+from nldyn.curves.walk import CurveWalk
 from nldyn.flow.flow_map import FlowMap, same_flow
 from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, gradient, tangent_surface
 from nldyn.orbits.conditions import Held, Monitor, defined_by

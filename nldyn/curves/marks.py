@@ -15,14 +15,8 @@ from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import leaves_circle
 from nldyn.bifurcations.touching import Touch, touching_extremes
 from nldyn.curves.codimension_two import is_torus, torus_pair
-from nldyn.curves.walk import (
-    UNFOLDED,
-    CurvePoint,
-    between,
-    clear_of_nodes,
-    curve_point,
-    is_torus_curve,
-)
+from nldyn.curves.point import CurvePoint, between, clear_of_nodes, curve_point
+from nldyn.curves.walk import UNFOLDED, is_torus_curve
 from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, length_unit
 from nldyn.orbits.conditions import Both, BranchPointCondition, Grazing, Singular, defined_by
 from nldyn.orbits.orbit import Orbit

@@ -20,7 +20,7 @@ from nldyn.branches.endings import StopReason
 from nldyn.branches.tables import UNITS
 from nldyn.curves.curves import Curve
 from nldyn.curves.marks import LocatedPoint
-from nldyn.curves.walk import CurvePoint
+from nldyn.curves.point import CurvePoint
 from nldyn.flow.flow_map import FlowMap
 from nldyn.io.flow import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
 from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute

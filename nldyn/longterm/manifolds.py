@@ -12,7 +12,8 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, check_whole, is_finite, shown
 from nldyn.flow.flow_map import FlowMap
-from nldyn.longterm.basins import UNDECIDED, Basins, StatePlane, Target, settle, target_of
+from nldyn.longterm.basins import Basins, StatePlane
+from nldyn.longterm.neighbourhoods import UNDECIDED, Target, settle, target_of
 from nldyn.orbits.orbit import Orbit, same_orbit, stroboscopic
 from nldyn.orbits.starts import near_returns, orbit_near
 from nldyn.runtime.executors import check_execution, values_of

@@ -17,9 +17,10 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_choice, check_types, is_finite, numbers, shown
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.longterm.attractors import Attractor
-from nldyn.longterm.basins import UNDECIDED, Basins
+from nldyn.longterm.basins import Basins
 from nldyn.longterm.measures import UNITS as MEASURE_UNITS
 from nldyn.longterm.measures import SpectraMap
+from nldyn.longterm.neighbourhoods import UNDECIDED
 from nldyn.longterm.poincare import BruteForce, Column, impact_section, stroboscopic_section
 from nldyn.longterm.simulation import Motion
 from nldyn.orbits.orbit import check_observe, stroboscopic

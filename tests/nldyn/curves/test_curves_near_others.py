@@ -20,7 +20,8 @@ from nldyn import (
     continue_special,
     solve_orbit,
 )
-from nldyn.curves.walk import CurvePoint, extremes_meet
+from nldyn.curves.corners import extremes_meet
+from nldyn.curves.point import CurvePoint
 from nldyn.plot.curves import plot_orbit_curve
 
 SECOND = Parameter("natural_frequency_hz", 1)

@@ -40,8 +40,8 @@ from nldyn.longterm import (
     stroboscopic_section,
 )
 from nldyn.longterm.attractors import Attractor, AttractorOptions, zero_one_test
-from nldyn.longterm.basins import settle, target_of
 from nldyn.longterm.measures import measures_table, power_spectrum, spectra_table
+from nldyn.longterm.neighbourhoods import settle, target_of
 from nldyn.longterm.poincare import BruteForce, Column
 from nldyn.orbits import OrbitSearchOptions
 from nldyn.plot.longterm import (
