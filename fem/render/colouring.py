@@ -20,6 +20,7 @@ from fem.elements.tapers import along
 from fem.mesh.cells import KINDS
 from fem.model.parts import SolidPart
 from fem.render.frame_surface import FrameSurface, outline
+from fem.render.several import SeveralSurfaces
 from fem.render.structure_surface import StructureSurface, swept_parts
 
 COLOURS = {"displacement": "m", "stress": "Pa", "moment": "N m"}
@@ -27,7 +28,7 @@ COLOURS = {"displacement": "m", "stress": "Pa", "moment": "N m"}
 
 
 def surface_values(
-    drawing: FrameSurface | StructureSurface, u: FloatArray, colour: str
+    drawing: FrameSurface | StructureSurface | SeveralSurfaces, u: FloatArray, colour: str
 ) -> FloatArray:
     """The quantity at every point of the surface, shape (P,), not negative.
 
@@ -51,6 +52,10 @@ def surface_values(
         raise ModelError(f"there is no colouring {colour!r}; there are {quoted(COLOURS)}")
     if colour == "displacement":
         return drawing.place(u)[1]
+    if isinstance(drawing, SeveralSurfaces):
+        pieces = drawing.component.pieces(u)
+        parts = drawing.parts.items()
+        return np.concatenate([surface_values(part, pieces[name], colour) for name, part in parts])
     if isinstance(drawing, FrameSurface):
         found = np.concatenate(list(_frame_values(drawing, u, colour)))
         return found if drawing.mirror is None else np.tile(found, 2)

@@ -28,6 +28,7 @@ from fem.render.colouring import surface_values
 from fem.render.frame_scenery import Block, StopSphere, mass_blocks, stop_solids, support_solids
 from fem.render.frame_surface import FrameSurface, frame_surface
 from fem.render.gl import RenderError, on_screen, require_gl
+from fem.render.several import OfPart, Several, SeveralSurfaces, stop_at
 from fem.render.structure_scenery import Cube, mass_cubes, stop_bodies, support_marks
 from fem.render.structure_surface import StructureSurface, structure_surface, without_mirror
 
@@ -35,8 +36,9 @@ if TYPE_CHECKING:
     import pyvista
 
 
-AnyComponent = Component | StructureComponent
-Surface = FrameSurface | StructureSurface
+AnyComponent = Component | StructureComponent | Several
+Surface = FrameSurface | StructureSurface | SeveralSurfaces
+Mass = Block | Cube | OfPart
 Image = npt.NDArray[np.uint8]
 Plotter = Any  # pyvista.Plotter while it is drawn in
 
@@ -454,15 +456,14 @@ def checked_states(component: AnyComponent, states: npt.ArrayLike, dimensions: i
     """The states as (m, N) floats, or ModelError."""
     array = np.asarray(states, dtype=np.float64)
     count = len(component.free)
+    source = component.source if isinstance(component, Several) else component.model.mesh.source
     if array.ndim != dimensions or array.shape[-1] != count or array.size == 0:
         raise ModelError(
-            f"{component.model.mesh.source}: displacements to draw have shape {array.shape},"
+            f"{source}: displacements to draw have shape {array.shape},"
             f" but the component has {count} degrees of freedom"
         )
     if not np.all(np.isfinite(array)):
-        raise ModelError(
-            f"{component.model.mesh.source}: displacements to draw are not all finite numbers"
-        )
+        raise ModelError(f"{source}: displacements to draw are not all finite numbers")
     return array.reshape(-1, count)
 
 
@@ -556,7 +557,7 @@ class Moving:
     surface: Any
     edges: Any
     actor: Any
-    blocks: Sequence[Block | Cube] = ()
+    blocks: Sequence[Mass] = ()
     colour: str = "displacement"
     factor_on_colour: float = 1.0
     largest: float = 0.0
@@ -570,7 +571,7 @@ class Moving:
         self.surface.point_data["colour"][:] = values * self.factor_on_colour
         self.surface.Modified()
         self.edges.Modified()
-        shape = self.drawing.component.shape(u)
+        shape: Any = self.drawing.component.shape(u)
         for block in self.blocks:
             block.move(shape, self.factor)
 
@@ -644,7 +645,19 @@ def polydata(drawing: Surface, points: FloatArray) -> tuple[Any, Any]:
 
 
 def surface_of(component: AnyComponent, mirror: str | None = None) -> Surface:
-    """The surface of a frame or a structure; only a frame can be mirrored."""
+    """The surface of a frame, a structure or several; only one frame can be mirrored."""
+    if isinstance(component, Several):
+        if mirror is not None:
+            raise ModelError(f"{component.source}: several components are drawn without a mirror")
+        parts = {name: part_surface(part) for name, part in component.parts.items()}
+        return SeveralSurfaces(component, parts)
+    return part_surface(component, mirror)
+
+
+def part_surface(
+    component: Component | StructureComponent, mirror: str | None = None
+) -> FrameSurface | StructureSurface:
+    """The surface of one component."""
     if isinstance(component, StructureComponent):
         without_mirror(component, mirror)
         return structure_surface(component)
@@ -716,7 +729,7 @@ def add_surroundings(
     drawing: Surface,
     factor: float,
     stop: StopSphere | None,
-) -> list[Block | Cube]:
+) -> list[Mass]:
     """Draw supports, the stop and the masses; the masses are returned, because they move."""
     marks, stops, blocks = surroundings(drawing, factor, stop)
     for solid, plane in marks:
@@ -733,8 +746,16 @@ def add_surroundings(
 
 def surroundings(
     drawing: Surface, factor: float, stop: StopSphere | None
-) -> tuple[list[tuple[Any, bool]], list[Any], list[Block | Cube]]:
+) -> tuple[list[tuple[Any, bool]], list[Any], list[Mass]]:
     """Marks of the supports, bodies of the stop, and the masses."""
+    if isinstance(drawing, SeveralSurfaces):
+        found: tuple[list[tuple[Any, bool]], list[Any], list[Mass]] = [], [], []
+        for name, part in drawing.parts.items():
+            marks, bodies, masses = surroundings(part, factor, stop_at(name, stop))
+            found[0].extend(marks)
+            found[1].extend(bodies)
+            found[2].extend(OfPart(name, mass) for mass in masses if not isinstance(mass, OfPart))
+        return found
     if isinstance(drawing, StructureSurface):
         stops = [] if stop is None else stop_bodies(drawing, stop, factor)
         return list(support_marks(drawing)), stops, [*mass_cubes(drawing, stop)]

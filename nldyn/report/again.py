@@ -5,11 +5,14 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import cms
+from fem.render.several import Several
 from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.branches.branch import Branch
 from nldyn.io.store import load
@@ -19,7 +22,7 @@ from nldyn.report.results import FILES, summary, tables_of
 from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.result_directory import OutputError, result_directory
 from nldyn.runtime.unfinished import unfinished_path
-from nldyn.scene.build import Structure, build_structure
+from nldyn.scene.build import AnyComponent, Structure, build_structure
 from nldyn.scene.read import load_scene
 from nldyn.scene.schema import Scene
 from nldyn.search.diagram import Diagram
@@ -31,11 +34,25 @@ SAME = 1e-9  # relative difference of the frequencies of modes that are the same
 
 
 def drawn_of(scene: Scene | None, structure: Structure) -> Drawn | None:
-    """The structure of a scene to be shown deflected, if it is of a mesh."""
-    if scene is None or scene.mesh is None or structure.reduced is None:
+    """The structure of a scene to be shown deflected, or what of it is of a mesh."""
+    if scene is None or structure.reduced is None:
         return None
-    component: Any = structure.component
+    if scene.components:
+        return _drawn_parts(structure.parts, structure.reduced)
+    component = structure.component
+    if scene.mesh is None or component is None or isinstance(component, cms.Matrices):
+        return None
     return Drawn(component, structure.reduced, scene.mesh.mirror)
+
+
+def _drawn_parts(parts: Mapping[str, AnyComponent], reduced: cms.ReducedModel) -> Drawn | None:
+    """Those of several components that are of meshes, with their rows of the reduced model."""
+    meshes = {n: part for n, part in parts.items() if not isinstance(part, cms.Matrices)}
+    if not meshes:
+        return None
+    rows = np.concatenate([np.arange(*reduced.components[name]) for name in meshes])
+    shown = replace(reduced, basis=reduced.basis[rows], residual_shapes=None, components={})
+    return Drawn(Several(meshes), shown)
 
 
 def report_again(
@@ -128,7 +145,7 @@ def as_diagram(found: object) -> Diagram:
 
 def drawn_again(scene: Scene | None, diagram: Diagram) -> tuple[Drawn | None, list[str]]:
     """The structure to be shown, and what is to be said if there is none."""
-    if scene is None or scene.mesh is None or not diagram.branches:
+    if scene is None or not (scene.mesh or scene.components) or not diagram.branches:
         return None, []
     try:
         drawn = drawn_of(scene, build_structure(scene))
@@ -138,7 +155,9 @@ def drawn_again(scene: Scene | None, diagram: Diagram) -> tuple[Drawn | None, li
             "'--scene' takes the scene from the place where it was computed"
         ]
     system = diagram.branches[0].points[0].system
-    hz = np.asarray(drawn.reduced.frequencies_hz) if drawn is not None else np.zeros(0)
+    if drawn is None:
+        return None, []
+    hz = np.asarray(drawn.reduced.frequencies_hz)
     if hz.shape != system.frequencies_hz.shape or not np.allclose(
         hz, system.frequencies_hz, rtol=SAME, atol=0.0
     ):

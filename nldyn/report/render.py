@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.errors import SceneError
+from nldyn.report.again import drawn_of
 from nldyn.report.modes import check_modes, mode_table
 from nldyn.report.results import write_table
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.runtime.result_directory import result_directory
-from nldyn.scene.build import Structure, build_reduced, build_system
+from nldyn.scene.build import Structure, build_structure, build_system, place
 from nldyn.scene.checks import check_computable
-from nldyn.scene.component import build_component
 from nldyn.scene.messages import scene_error
 
 if TYPE_CHECKING:
     import cms
-    import fem
     from fem.render import StopSphere
+    from fem.render.pictures import AnyComponent
     from nldyn.orbits.orbit import Impact, Orbit
     from nldyn.report.comparison import Comparison
     from nldyn.runtime.progress import Progress
@@ -118,10 +118,7 @@ def render_scene(
     """
     from fem.render.pictures import check_video
 
-    if scene.mesh is None:
-        if scene.components:
-            fault = "are not drawn: only a scene with one mesh is; 'nldyn modes' tells their modes"
-            raise scene_error(scene.file, ("components",), fault)
+    if not any(each.mesh for each in (scene, *scene.components.values())):
         raise scene_error(scene.file, ("mesh",), "is missing: only a mesh can be drawn")
     if scene.continuation is not None or frequency_hz is not None:
         check_computable(scene, scene.file)
@@ -129,15 +126,15 @@ def render_scene(
         check_video(Path(directory) / f"motion.{video}")
     shares = Shares(progress or silent, {"model": 1.0, "orbit": 5.0, "pictures": 10.0})
     shares.part("model")("model", 0.0, 0.0)
-    component = build_component(scene)
-    reduced = build_reduced(scene, component)
+    structure = build_structure(scene)
     shares.end("model")
-    table = mode_table(scene, Structure(component, reduced))
-    check_modes(scene, modes, reduced.size)
+    table = mode_table(scene, structure)
+    check_modes(scene, modes, len(table.frequencies_hz))
     orbit = None
     if scene.continuation is not None:
         tell = shares.part("orbit")
-        orbit = orbit_to_draw(scene, build_system(scene, reduced), frequency_hz, period, tell, jobs)
+        system = build_system(scene, structure.reduced)
+        orbit = orbit_to_draw(scene, system, frequency_hz, period, tell, jobs)
     shares.end("orbit")
     with result_directory(directory, "render") as folder:
         write_table(folder / "modes.csv", table.columns(), table.rows())
@@ -145,7 +142,8 @@ def render_scene(
         if orbit is not None:
             save_orbit(orbit, folder)
         tell = shares.part("pictures")
-        drawing = Drawing(scene, component, reduced, folder, tell, tuple(modes), view)
+        drawing = Drawing.of(scene, structure, folder, modes, view, tell)
+        assert drawing is not None  # there is a mesh
         drawing.pages(orbit)
         missing = drawing.draw(orbit, video)
     return Rendering(Path(directory), orbit, missing)
@@ -249,10 +247,9 @@ def render_modes_of(
         if against is not None:
             write_table(folder / "mac.csv", against.columns(), against.rows())
             save_mac(against, folder)
-        if scene.mesh is None or structure.reduced is None:
+        drawing = Drawing.of(scene, structure, folder, modes, view)
+        if drawing is None:
             return ""
-        component: Any = structure.component
-        drawing = Drawing(scene, component, structure.reduced, folder, silent, tuple(modes), view)
         drawing.mode_page()
         return drawing.mode_picture(against, animated)
 
@@ -271,14 +268,14 @@ def modes_in_window(
     """
     from fem.render import render_modes
 
-    if scene.mesh is None or structure.reduced is None:
+    drawing = Drawing.of(scene, structure, Path(), modes, view)
+    if drawing is None:
         raise SceneError(f"{scene.file}: only a mesh can be drawn")
-    component: Any = structure.component
-    drawing = Drawing(scene, component, structure.reduced, Path(), silent, tuple(modes), view)
-    shapes = structure.reduced.basis[:, drawing.chosen]
+    shapes = drawing.reduced.basis[:, drawing.chosen]
     return render_modes(
-        component, shapes, drawing.mode_titles, mirror=_mirror(scene), view=view, size=WINDOW
-    )
+        drawing.component, shapes, drawing.mode_titles, mirror=_mirror(scene), view=view,
+        size=WINDOW,
+    )  # fmt: skip
 
 
 def save_mac(against: Comparison, folder: Path) -> None:
@@ -305,13 +302,17 @@ def stop_sphere(scene: Scene, index: int) -> StopSphere | None:
 
     axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
     stop = scene.stops[index]
-    place = scene.interfaces[stop.at]
-    if place.direction not in axes:
+    part, name, of = scene, stop.at, ""
+    if scene.components:
+        component, name = place(stop.at)
+        part, of = scene.component_scenes[component], f"{component}."
+    interface = part.interfaces.get(name)
+    if interface is None or interface.direction not in axes:
         return None
-    way = tuple(stop.direction * along for along in axes[place.direction])
-    if scene.mesh is None or scene.mesh.model == "frame":
+    way = tuple(stop.direction * along for along in axes[interface.direction])
+    if part.mesh is None or part.mesh.model == "frame":
         way = way[:2]
-    return StopSphere(place.at, stop.radius or DRAWN_RADIUS, way, stop.gap)
+    return StopSphere(of + interface.at, stop.radius or DRAWN_RADIUS, way, stop.gap)
 
 
 def stop_to_draw(scene: Scene, impact: Impact | None) -> StopSphere | None:
@@ -327,12 +328,28 @@ class Drawing:
     """The pages for a browser, and the pictures, which need a graphics library."""
 
     scene: Scene
-    component: fem.Component | fem.StructureComponent
+    component: AnyComponent
     reduced: cms.ReducedModel
     folder: Path
     tell: Progress
     modes: tuple[int, ...] = ()
     view: str = "oblique"
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        structure: Structure,
+        folder: Path,
+        modes: Sequence[int],
+        view: str,
+        tell: Progress = silent,
+    ) -> Drawing | None:
+        """Of what of a structure is of a mesh, if anything is."""
+        drawn = drawn_of(scene, structure)
+        if drawn is None:
+            return None
+        return cls(scene, drawn.component, drawn.reduced, folder, tell, tuple(modes), view)
 
     def mode_picture(self, against: Comparison | None = None, animated: bool = False) -> str:
         """Draw the modes, also beside others or in motion; say what is missing for it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -62,10 +62,13 @@ class Structure:
         None where the scene gives modes, several components, or matrices that are not reduced.
     reduced : cms.ReducedModel, optional
         None where nothing is reduced.
+    parts : dict of str to component
+        The components of a scene that has several, by name.
     """
 
     component: AnyComponent | None = None
     reduced: cms.ReducedModel | None = None
+    parts: Mapping[str, AnyComponent] = field(default_factory=dict)
 
 
 def build_structure(scene: Scene, progress: Progress | None = None) -> Structure:
@@ -76,10 +79,11 @@ def build_structure(scene: Scene, progress: Progress | None = None) -> Structure
     >>> from nldyn.base.resources import example
     >>> from nldyn.scene.read import load_scene
     >>> build_structure(load_scene(example("one_dof.toml")))
-    Structure(component=None, reduced=None)
+    Structure(component=None, reduced=None, parts={})
     """
     if scene.components:
-        return Structure(None, build_reduced(scene))
+        parts = build_parts(scene)
+        return Structure(None, join(scene, parts), parts)
     if scene.reduction is None:
         return Structure()
     component = build_any(scene)

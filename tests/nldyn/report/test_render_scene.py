@@ -48,7 +48,7 @@ def test_without_graphics_the_rest_is_written(tmp_path, monkeypatch):
 def test_mp4_that_cannot_be_written_is_told_before_the_work(tmp_path, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     monkeypatch.setattr(
-        "nldyn.report.render.build_component", lambda scene: pytest.fail("computed")
+        "nldyn.report.render.build_structure", lambda scene: pytest.fail("computed")
     )
     result, out = render(tmp_path, BEAM, "--frequency-hz", "23.0", "--video", "mp4")
     assert result.exit_code == 3

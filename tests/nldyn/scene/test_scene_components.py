@@ -11,11 +11,15 @@ from scipy import io, sparse
 from scipy.linalg import eigh
 
 import fem
+import fem.render
+from fem.render.pictures import surface_of
 from nldyn import SceneError, solve_orbit
 from nldyn.app.cli import main
 from nldyn.base.resources import example
+from nldyn.report.again import drawn_of
+from nldyn.report.render import stop_to_draw
 from nldyn.scene.backbone import undamped
-from nldyn.scene.build import build_parts, build_reduced, build_system
+from nldyn.scene.build import build_parts, build_reduced, build_structure, build_system
 from nldyn.scene.case_fingerprints import case_fingerprints
 from nldyn.scene.read import load_scene, parse_scene
 from nldyn.system.equilibrium import rest
@@ -288,10 +292,32 @@ def test_the_example_has_the_modes_of_its_whole():
     assert found == pytest.approx(np.sqrt(squares) / (2 * np.pi), rel=1e-7)
 
 
-def test_several_components_are_not_drawn(tmp_path):
-    scene = str(example("portal_with_absorber.toml"))
-    told = CliRunner().invoke(main, ["render", scene, "--out", str(tmp_path / "r")])
-    assert told.exit_code == 2 and "components are not drawn" in told.output
+def test_joined_components_are_drawn_as_the_whole(tmp_path):
+    """The tip of a cantilever of the mass m moves by 2/√m in its first mode of unit modal mass."""
+    scene = halves(tmp_path, FORCE + JOINTS)
+    drawn = drawn_of(scene, build_structure(scene))
+    drawing = surface_of(drawn.component)
+    points, _ = drawing.place(np.zeros(len(drawn.component.free)))
+    _, size = drawing.place(drawn.reduced.basis[:, 0])
+    assert np.ptp(points, axis=0) == pytest.approx([2 * L, H, B])
+    assert size.max() == pytest.approx(2.0 / np.sqrt(RHO * B * H * 2 * L), rel=1e-4)
+    assert points[size.argmax(), 0] == pytest.approx(2 * L)
+    joint = np.abs(points[:, 0] - L) < 1e-9  # the last of one half and the first of the other
+    assert joint.sum() >= 8 and np.ptp(size[joint]) < 1e-9 * size.max()
+    corners = np.concatenate([faces.ravel() for faces in drawing.faces()])
+    assert np.array_equal(np.unique(corners), np.arange(len(points)))
+
+
+def test_of_a_mesh_and_matrices_the_mesh_is_drawn(tmp_path, monkeypatch):
+    monkeypatch.setattr(fem.render, "gl_available", lambda: (False, "install libegl1"))
+    scene, out = str(example("portal_with_absorber.toml")), tmp_path / "r"
+    told = CliRunner().invoke(main, ["render", scene, "--out", str(out), "--frequency-hz", "12"])
+    assert told.exit_code == 3 and told.stderr.endswith("nldyn: install libegl1\n")
+    assert {"mode_shapes.html", "deepest_contact.html", "orbit.png"} < {
+        path.name for path in out.iterdir()
+    }
+    stop = stop_to_draw(load_scene(scene), None)
+    assert (stop.point, stop.direction, stop.gap) == ("frame.CORNER-R", (1.0, 0.0), 2e-3)
 
 
 def test_check_tells_of_every_component():
