@@ -141,13 +141,15 @@ def check_pressed(seed):
     assert not found.failure
     growth = 1.0 + np.abs(found.jacobians).max()
     assert np.abs(rows @ flow.to_modal(found.ends)[0] - end).max() < 1e-9 * growth
-    by_start, _ = differences(system, state, omega, PERIOD, 1e-5)
+    # beside grazing their error goes with the square of the step, up to 6e-6, and is extrapolated
+    wide, narrow = (differences(system, state, omega, PERIOD, h)[0] for h in (2e-5, 1e-5))
+    by_start = (4.0 * narrow - wide) / 3.0
     return np.abs(found.jacobians[0] - by_start).max() / growth, rested
 
 
 def test_random_systems_hit_and_rest_as_exponentials_say():
-    """Differences are good to 1e-8 of the growth. In the last one two stops end by one chatter."""
-    errors, rested = np.array([check_pressed(seed) for seed in range(10)]).T
+    """To 1e-8 of the growth. Two stops of number 9 end by one chatter, 341 and 348 nearly graze."""
+    errors, rested = np.array([check_pressed(seed) for seed in (*range(10), 341, 348)]).T
     assert errors.max() < 1e-8
     assert np.sum(rested > 0.0) > 5
 
