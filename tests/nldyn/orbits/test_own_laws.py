@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 from numba import njit
 
-from nldyn import ConvergenceError, HarmonicForce, Stop, System, solve_orbit
+from nldyn import (
+    ConstantForce,
+    ConvergenceError,
+    HarmonicForce,
+    RigidStop,
+    Stop,
+    System,
+    Unbalance,
+    continue_branch,
+    solve_orbit,
+)
 
 K, TURN = 1e5, 1e-5
 
@@ -58,6 +68,56 @@ def test_a_law_that_is_resolved_is_as_sure_as_a_stop_of_the_same_law():
     assert own.resolved and "resolved" not in repr(own)
     assert own.multipliers == pytest.approx(exact.multipliers, abs=1e-8)
     assert own.stability.verdict == "stable" and own.stability.uncertainty < 1e-6
+
+
+E, SHAKE, G, STIFF = 0.8, 1e-3, 9.81, 1e7  # a ball on a table that shakes
+
+
+def constant_restitution(v0: float):
+    """A hysteresis that sets in within a speed of v0 and loses the same share at any other one."""
+    loss = (1 - E**2) / (1 + E**2)
+
+    @njit
+    def law(depth, speed):
+        t = math.tanh(speed / v0)
+        grown = STIFF * (1.0 + loss * t)
+        return depth * grown, grown, STIFF * depth * loss * (1.0 - t * t) / v0
+
+    return law
+
+
+def bouncing(stop):
+    """The orbit at 15 Hz with one impact, at the phase at which the rigid table has it."""
+    system = System.from_matrices(
+        [[1.0]], [[0.0]], {"x": [1.0]}, stops=[stop],
+        excitation=[Unbalance("x", SHAKE), ConstantForce("x", -G)],
+    )  # fmt: skip
+    rate, leave = 2 * math.pi * 15.0, 0.5 * G / 15.0  # half a period of free fall
+    hit = math.asin(leave * (1 - E) / (1 + E) / (SHAKE * rate))
+    since = hit / rate
+    place = SHAKE * math.cos(hit) + leave * since - 0.5 * G * since**2 - SHAKE
+    return solve_orbit(system, 15.0, guess=np.array([place, leave - G * since]))
+
+
+def test_a_steep_hysteresis_is_resolved_or_told():
+    """Multipliers of the modulus e, but for the weight beside the force of the contact."""
+    close = G / (0.29 * math.sqrt(STIFF))
+    for v0, resolved in ((0.01, True), (0.001, False)):
+        orbit = bouncing(Stop("x", STIFF, 1.0, direction=-1, law=constant_restitution(v0)))
+        assert orbit.impacts == 1
+        assert abs(orbit.multipliers) == pytest.approx(E, rel=close)
+        assert orbit.resolved == resolved
+        assert orbit.stability.verdict == ("stable" if resolved else "undecided")
+
+
+def test_a_rigid_table_flips_where_the_closed_form_says():
+    """1 + tr + e² = 0: with r = (1 - e)/(1 + e), Aω² = g times the hypotenuse of 1 + r² and πr."""
+    branch = continue_branch(bouncing(RigidStop("x", E, direction=-1)), (14.9, 16.5))
+    r = (1 - E) / (1 + E)
+    exact = math.sqrt(G * math.hypot(1 + r**2, math.pi * r) / SHAKE) / (2 * math.pi)
+    (flip,) = branch.special_points
+    assert flip.kind == "PD" and flip.frequency_hz == pytest.approx(exact, rel=1e-8)
+    assert exact == pytest.approx(16.3123, abs=5e-5)
 
 
 @pytest.mark.parametrize(

@@ -319,6 +319,19 @@ def test_an_example_under_loads_is_periodic_by_a_runge_kutta_method(name, hz):
     assert (np.abs(end - start)[: system.size] < 3e-6 * sizes[: system.size].max()).all()
 
 
+def test_the_instrument_touches_its_bumper_where_the_closed_form_says():
+    """a/|k/m - ω² + iωc/m| = gap: a quadratic in ω²."""
+    a, k, c, gap = 1.5, 3200.0 / 2.0, 4.0 / 2.0, 2e-3
+    half = k - 0.5 * c**2
+    square = half - math.sqrt(half**2 - k**2 + (a / gap) ** 2)
+    exact = math.sqrt(square) / (2 * math.pi)
+    system = build_system(load_scene(example("bumper.toml")))
+    branch = continue_branch(solve_orbit(system, 4.5), (4.5, 4.7))
+    (touch,) = (p.frequency_hz for p in branch.special_points if p.kind == "GR")
+    assert touch == pytest.approx(exact, rel=1e-9)
+    assert exact == pytest.approx(4.646333, abs=5e-7)
+
+
 def test_a_tube_lies_in_its_baffle_with_the_force_of_beam_theory():
     """Three supports, the middle one a spring of 1e6 N/m that is 0.3 mm lower."""
     system = build_system(load_scene(example("tube_between_baffles.toml")))
