@@ -187,7 +187,7 @@ def _fault(model: type[BaseModel], detail: ErrorDetails) -> str:
         return str(context["error"])
     if kind == "literal_error":
         return f"must be {context['expected']}, not {show(given)}"
-    if kind == "too_short":
+    if kind == "too_short" and not given:
         return "must not be empty"
     if kind == "list_type" and isinstance(given, dict) and table_at(model, (*detail["loc"], 0)):
         return f"must be written with two brackets: [[{format_key(detail['loc'])}]]"

@@ -168,6 +168,7 @@ def test_what_is_left_out_of_a_measured_force_is_told():
         ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nforce = 2.0', "not a key of kind"),
         ('kind = "base"\nat = "x"\namplitude = 1.0', "'x' is an interface, .* load vector M r"),
         ('kind = "weight"\nacceleration = [0.0, -9.81]', "needs a .mesh.; give 'loads'"),
+        ('kind = "weight"\nacceleration = [0.0]', "must be a list of at least 2 values"),
         ('kind = "base"\namplitude = 1.0', "needs 'direction'.* or 'at' naming a load vector"),
         ('kind = "base"\ndirection = "x"\namplitude = 1.0', "needs a .mesh."),
         ('kind = "measured"\nat = "x"\nfile = "none.csv"', "none.csv, which does not exist"),
