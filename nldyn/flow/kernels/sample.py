@@ -22,6 +22,7 @@ compiled = resting_on(njit(cache=True, error_model="numpy"), *FILES)
 
 UNSEEN = 1e-14  # share of a displacement that rounding may be
 PER_HALF_WAVE = 8.0  # samples of the fastest motion that is seen, between which extremes are sought
+AT_ONCE = 1e-6  # of the time to the next sample: a difference over it is the slope of a rate
 MOST_SAMPLES = 3_000_000  # of a piece, a tenth of a second, in which no more extremes are told
 
 
@@ -202,7 +203,8 @@ def local_extremes(
     The rate is sampled sixteen times per period of the fastest mode that `leave_unseen` leaves, or
     that stops move in contact; its sign changes are refined. In flight, where a parabola through
     three samples of one sign comes near zero, it is looked for a change of sign there: two extremes
-    closer than the samples. The motion is taken as periodic: an extreme at its start counts once.
+    closer than the samples. So it is behind the first, which may be an impact, by the rate's slope.
+    The motion is taken as periodic: an extreme at its start counts once.
     forced (1 + k,) is what the terms add to the output.
     """
     found = np.empty((64, 3))
@@ -262,12 +264,25 @@ def local_extremes(
                     )  # fmt: skip
                 found, n = append_extreme(found, n, rec_phase[piece] + omega * middle, value, sign)
                 sign = new_sign
-            elif kind == FLIGHT and i > 1 and rate_older * rate_old > 0.0 and rate_old * rate > 0.0:
+            elif (
+                kind == FLIGHT and rate_old * rate > 0.0 and (i == 1 or rate_older * rate_old > 0.0)
+            ):
                 # two extremes between samples of one sign: where their parabola comes to zero
                 lo, hi, rate_lo, rate_hi = t_older, t, rate_older, rate
                 middle, rate_middle = t_old, rate_old
-                for _ in range(3):
-                    where = near_zero(lo, middle, hi, rate_lo, rate_middle, rate_hi)
+                if i == 1:  # behind an impact, where the rate may turn fast: by its slope
+                    lo, rate_lo = t_old, rate_old
+                    state_at(blocks, tab, kind, h, start, shares, AT_ONCE * t, v)
+                    value, slope = output_rate(
+                        row, row1, terms, forced, omega, rec_phase[piece] + omega * AT_ONCE * t,
+                        AT_ONCE * t, v,
+                    )  # fmt: skip
+                    slope = (slope - rate_old) / (AT_ONCE * t)
+                for step in range(3):
+                    if i == 1 and step == 0:
+                        where = -2.0 * rate_old / slope if slope * rate_old < 0.0 else hi
+                    else:
+                        where = near_zero(lo, middle, hi, rate_lo, rate_middle, rate_hi)
                     if not lo < where < hi or where == middle:
                         break
                     state_at(blocks, tab, kind, h, start, shares, where, v)

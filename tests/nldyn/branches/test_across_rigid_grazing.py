@@ -108,3 +108,13 @@ def test_a_branch_with_rest_steps_over_all_impacts_that_pass_a_phase_of_shooting
         end, _, rested = exact.run(state, TURN / orbit.omega)
         assert rested > 0.1 * TURN / orbit.omega
         assert np.abs(end - state).max() < 1e-9
+
+
+def test_a_near_miss_right_behind_an_impact_is_seen():
+    """Strongly damped, each bounce is shorter: the branch wins impact after impact by grazing."""
+    matrices, force, hz, *_ = ACROSS["overdamped"]
+    system = system_of(matrices, force, [RigidStop("x0", RESTITUTION, GAP)])
+    branch = continue_branch(solve_orbit(system, hz), (0.0935, 0.35))
+    assert branch.stop_reasons[0].ending is Ending.RANGE_END
+    won = [special.orbit.impacts for special in branch.special_points if special.kind == "GR"]
+    assert won == [7, 6, 5, 4, 3, 2, 1, 0]
