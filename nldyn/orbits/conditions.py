@@ -44,7 +44,7 @@ CLEAR = 1e-12  # of an orbit's size: distance to a rigid stop that counts as non
 WIDEST_PASSAGE = 0.5  # rad on either side of a grazing, in which a rigid stop is not there
 SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
 FARTHEST = 0.01  # of the orbit's size: depth of an extreme that may be said to graze
-SAME_EXTREME = 0.2  # rad between two extremes that are one on neighbouring orbits
+FOLLOWED_EXTREME = 0.2  # rad between two extremes that are one on neighbouring orbits
 AT_NODE = 1e-12  # rad from a node of shooting, at which an extreme has the state of that
 
 Monitor = str | Callable[[Orbit], float]
@@ -291,7 +291,7 @@ class Grazing:
         """Whether an extreme near a phase is this one."""
         full = 2.0 * math.pi * period
         apart = abs((phase - self.phase + 0.5 * full) % full - 0.5 * full)
-        return stop == self.stop and is_maximum == self.is_maximum and apart < SAME_EXTREME
+        return stop == self.stop and is_maximum == self.is_maximum and apart < FOLLOWED_EXTREME
 
     def extreme(self, orbit: Orbit) -> tuple[float, float]:
         """Phase and depth of the extreme."""
