@@ -52,7 +52,7 @@ from nldyn.runtime.kernel_cache import first_call
 from nldyn.system.contact_law import law_address
 from nldyn.system.linear import ForcedResponse
 from nldyn.system.parameters import Parameter
-from nldyn.system.ride import Ride
+from nldyn.system.ride import NO_RIDE, Ride
 from nldyn.system.stop import Stop
 from nldyn.system.system import Clock, System, same_system
 
@@ -276,7 +276,7 @@ class FlowMap:
         s = self.system
         place = output - len(s.stops) - len(s.bonds)
         observed = 0 <= place < len(s.interfaces)
-        return s.ride(s.interfaces[place], omega) if observed else Ride.of((), omega)
+        return s.ride(s.interfaces[place], omega) if observed else NO_RIDE
 
     @cached_property
     def rate_rows(self) -> Real:
@@ -717,7 +717,7 @@ class Trajectory:
                 f"phases must lie within the motion, {first:g} to {last:g}, got "
                 f"{phases[0]:g} to {phases[-1]:g}"
             )
-        return self._evaluate(sample_states, phases)
+        return self._evaluate(sample_states, NO_RIDE, phases)
 
     def _solved_in_contact(self, phases: Real) -> tuple[NDArray[np.intp], Real]:
         """Which of some ascending phases lie in contact panels, and the flow map's states (k, 2n).
@@ -770,9 +770,8 @@ class Trajectory:
         """The same with the values of the recorded polynomials, in contacts good to 1e-6."""
         flow = self.flow
         check_whole("output", output, 0, len(flow.rows) - 1)
-        row, ride = flow.rows[output], flow.ride(output, self.omega)
-        forced = np.append(self._response.amplitudes @ row, ride.amplitudes)
-        return self._evaluate(local_extremes, row, flow.rate_rows[output], forced, more=ride.orders)
+        ride = flow.ride(output, self.omega)
+        return self._evaluate(local_extremes, ride, output)
 
     def with_exact_values(self, found: Real, output: int, wanted: NDArray[np.bool_]) -> Real:
         """Extremes (k, 3) of an output, those wanted (k,) with the values of the flow map."""
@@ -793,31 +792,10 @@ class Trajectory:
         phases = rec.phase[contact, None] + self.omega * duration * tables.chi[kind]
         return phases.ravel(), (duration * tables.weights[kind]).ravel()
 
-    @cached_property
-    def _response(self) -> ForcedResponse:
-        """Response to the excitation."""
-        return self.flow.response(self.omega)
-
-    def _evaluate(self, kernel: Any, *arguments: object, more: Real | None = None) -> Real:
-        """Call a kernel of `_sample` on the recorded pieces, perhaps with more orders of terms."""
-        data, tables, rec = self.flow._data, self.flow.tables, self.record
-        terms, amplitudes = self._response.terms, self._response.amplitudes
-        if more is not None and more.size:
-            terms = terms.with_steady(more)
-            amplitudes = np.vstack([amplitudes, np.zeros((more.size, amplitudes.shape[1]))])
+    def _evaluate(self, kernel: Any, ride: Ride, wanted: Any) -> Real:
+        """Call a kernel of `sample` on the recorded pieces."""
+        flow = self.flow
         found = kernel(
-            data.blocks,
-            data.force,
-            self.omega,
-            tables,
-            rec.phase,
-            rec.duration,
-            rec.kind,
-            rec.start,
-            rec.force,
-            int(rec.used[0]),
-            terms,
-            amplitudes,
-            *arguments,
+            flow._data, flow.tables, self.record, self.omega, ride.orders, ride.amplitudes, wanted
         )
         return np.asarray(found)

@@ -64,7 +64,7 @@ def rigid_impacts(motion: Trajectory, stop: int) -> RigidImpacts:
     depth = rec.start[after] @ row - gap
     speed, rebound = before @ rate, -(rec.start[after] @ rate)
     size = (np.abs(rec.start) @ np.abs(row)).max() + gap
-    size += motion._response.size(motion.omega) * np.abs(row).sum()
+    size += motion.flow.response(motion.omega).size(motion.omega) * np.abs(row).sum()
     fastest = max(np.abs(rec.start @ rate).max(), np.abs(speed).max())
     hit = (np.abs(depth) <= SHUT * size) & (speed > STILL * fastest)
     hit &= speed + rebound > STILL * speed

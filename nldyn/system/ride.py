@@ -54,6 +54,9 @@ class Ride(NamedTuple):
         return np.asarray(np.exp(1j * np.asarray(phases)[..., None] * self.orders))
 
 
+NO_RIDE = Ride.of((), 0.0)  # of a place at rest
+
+
 def displacement(source: BaseMotion, omega: float) -> complex:
     """Complex amplitude in m of a base's displacement: what it has of -x'' is (mω)² x."""
     pace = source.harmonic * omega

@@ -24,7 +24,7 @@ from nldyn.system.linear import (
     without_rounding,
 )
 from nldyn.system.loads import BaseMotion, Excitation, HarmonicForce
-from nldyn.system.ride import Ride
+from nldyn.system.ride import NO_RIDE, Ride
 from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.spin import Spin, same_spin, skew
 from nldyn.system.springs_dampers import (
@@ -672,7 +672,9 @@ class System:
 
         Nothing, unless the interface was made by `with_absolute`.
         """
-        factors = self.rides.get(interface, {})
+        factors = self.rides.get(interface)
+        if not factors:
+            return NO_RIDE
         bases = [
             (source, factors[source.at])
             for source in self.excitation

@@ -7,6 +7,7 @@ import numpy as np
 from nldyn.base.arrays import SLACK
 from nldyn.flow.kernels.compiling import FILES, allocating, inner, njit
 from nldyn.flow.kernels.flights import (
+    at_frequency,
     block_exponential,
     fastest_moved,
     fly_state,
@@ -16,7 +17,7 @@ from nldyn.flow.kernels.flights import (
 from nldyn.flow.kernels.layout import FLIGHT, SUM_ROUNDING
 from nldyn.flow.kernels.resolution import map_fraction
 from nldyn.runtime.kernel_cache import resting_on
-from nldyn.system.linear import STEADY
+from nldyn.system.linear import STEADY, Terms
 
 compiled = resting_on(njit(cache=True, error_model="numpy"), *FILES)
 
@@ -121,29 +122,60 @@ def without_steady(terms, response, phase, state, w):
                 w[k] -= (response[p, k] * turn).real
 
 
-@compiled
-def sample_states(
-    blocks, force, omega, tab,
-    rec_phase, rec_duration, rec_kind, rec_start, rec_force, count, terms, response, phases,
-):  # fmt: skip
-    """States (n_phases, 2n) at ascending forcing phases.
+@allocating
+def responses(system, omega, orders, amplitudes, out):
+    """What excitation brings about at a frequency: terms, of the state and of an output.
 
-    terms (k of them) and response (1 + k, 2n) are those of a `ForcedResponse`.
+    The output also rides on a base that moves by Σ Re(amplitudes e^{i orders ωt}).
+
+    Returns
+    -------
+    terms : Terms
+        k of them, those of the base last.
+    response : (1 + k, 2n)
+        Amplitudes of the state, as of a `ForcedResponse`.
+    forced : (1 + k,)
+        Those of the output.
     """
+    found = at_frequency(
+        system, omega, np.zeros((0, 2), dtype=np.int64), np.zeros((0, 1, 3, 1), dtype=np.complex128)
+    )
+    k, size = found.terms.kinds.size, system.force.shape[0]
+    count = k + orders.size
+    terms = Terms(np.full(count, STEADY), np.zeros(count), np.zeros(count, dtype=np.complex128))
+    response = np.zeros((1 + count, size), dtype=np.complex128)
+    forced = np.zeros(1 + count, dtype=np.complex128)
+    for p in range(1 + k):
+        for i in range(size):
+            response[p, i] = found.response[p, 0, i]
+        forced[p] = found.forced[p, 0, out]
+    for p in range(k):
+        terms.kinds[p] = found.terms.kinds[p]
+        terms.orders[p], terms.rates[p] = found.terms.orders[p], found.terms.rates[p]
+    for p in range(k, count):
+        terms.orders[p], forced[1 + p] = orders[p - k], amplitudes[p - k]
+    return terms, response, forced
+
+
+@compiled
+def sample_states(system, tab, rec, omega, orders, amplitudes, phases):
+    """States (n_phases, 2n) at ascending forcing phases; for the arguments see `local_extremes`."""
+    blocks, force = system.blocks, system.force
+    terms, response, _ = responses(system, omega, orders, amplitudes, 0)
     states = np.empty((phases.size, force.shape[0]))
     shares = np.empty((tab.nodes.size, force.shape[0]))
     start = np.empty(force.shape[0])
     piece, ready = 0, -1
     for i in range(phases.size):
-        while piece + 1 < count and rec_phase[piece + 1] <= phases[i]:
+        while piece + 1 < rec.used[0] and rec.phase[piece + 1] <= phases[i]:
             piece += 1
-        kind, h = rec_kind[piece], rec_duration[piece]
+        kind, h = rec.kind[piece], rec.duration[piece]
         if ready != piece:
-            without_steady(terms, response, rec_phase[piece], rec_start[piece], start)
+            without_steady(terms, response, rec.phase[piece], rec.start[piece], start)
             if kind != FLIGHT:
-                impulses(blocks, force, tab, kind, h, rec_force[piece], shares)
+                impulses(blocks, force, tab, kind, h, rec.force[piece], shares)
             ready = piece
-        t = (phases[i] - rec_phase[piece]) / omega
+        t = (phases[i] - rec.phase[piece]) / omega
         state_at(blocks, tab, kind, h, start, shares, t, states[i])
         for p in range(response.shape[0]):
             e = turned(phases[i])
@@ -193,11 +225,7 @@ def leave_unseen(blocks, row, forced, w):
 
 
 @compiled
-def local_extremes(
-    blocks, force, omega, tab,
-    rec_phase, rec_duration, rec_kind, rec_start, rec_force, count, terms, response,
-    row, row1, forced,
-):  # fmt: skip
+def local_extremes(system, tab, rec, omega, orders, amplitudes, out):
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output.
 
     The rate is sampled sixteen times per period of the fastest mode that `leave_unseen` leaves, or
@@ -205,8 +233,21 @@ def local_extremes(
     three samples of one sign comes near zero, it is looked for a change of sign there: two extremes
     closer than the samples. So it is behind the first, which may be an impact, by the rate's slope.
     The motion is taken as periodic: an extreme at its start counts once.
-    forced (1 + k,) is what the terms add to the output.
+
+    Parameters
+    ----------
+    system, tab, rec : SystemData, GaussTables, Record
+        The pieces of a motion, and of what.
+    omega : float
+        Excitation frequency.
+    orders, amplitudes : (k,)
+        Of a base on which the output rides, see `responses`.
+    out : int
+        The output.
     """
+    blocks, force = system.blocks, system.force
+    row, row1 = system.rows[0, out], system.rows[1, out]
+    terms, response, forced = responses(system, omega, orders, amplitudes, out)
     found = np.empty((64, 3))
     n = 0
     w, v, start = np.empty(force.shape[0]), np.empty(force.shape[0]), np.empty(force.shape[0])
@@ -216,17 +257,17 @@ def local_extremes(
     moved = fastest_moved(blocks, force)
     first_value, first_sign, sign, t_old, rate_old = 0.0, 0, 0, 0.0, 0.0
     t_older, rate_older = 0.0, 0.0
-    for piece in range(count):
-        h = rec_duration[piece]
-        kind = rec_kind[piece]
-        without_steady(terms, response, rec_phase[piece], rec_start[piece], start)
+    for piece in range(rec.used[0]):
+        h = rec.duration[piece]
+        kind = rec.kind[piece]
+        without_steady(terms, response, rec.phase[piece], rec.start[piece], start)
         seen = max(omega, leave_unseen(blocks, row, forced, start))
         if kind != FLIGHT:
             seen = max(seen, moved)
         pieces = int(min(np.ceil(h * seen * (PER_HALF_WAVE / np.pi)), MOST_SAMPLES)) + 1
         if kind != FLIGHT:
             pieces += tab.nodes.size
-            impulses(blocks, force, tab, kind, h, rec_force[piece], shares)
+            impulses(blocks, force, tab, kind, h, rec.force[piece], shares)
             if weights.shape[0] != pieces + 1:
                 weights = np.empty((pieces + 1, tab.nodes.size))
                 for i in range(pieces + 1):
@@ -248,7 +289,7 @@ def local_extremes(
                     w[2 * b] = steps[b, 0] * x + steps[b, 1] * y
                     w[2 * b + 1] = steps[b, 2] * x + steps[b, 3] * y
             value, rate = output_rate(
-                row, row1, terms, forced, omega, rec_phase[piece] + omega * t, t, w
+                row, row1, terms, forced, omega, rec.phase[piece] + omega * t, t, w
             )
             new_sign = 1 if rate > 0.0 else -1 if rate < 0.0 else sign
             if piece == 0 and i == 0:
@@ -260,9 +301,9 @@ def local_extremes(
                 if i > 0:
                     middle, value = turning_point(
                         blocks, tab, kind, h, start, shares, row, row1, terms, forced, omega,
-                        rec_phase[piece], h / pieces, sign, t_old, t, rate_old, rate, v,
+                        rec.phase[piece], h / pieces, sign, t_old, t, rate_old, rate, v,
                     )  # fmt: skip
-                found, n = append_extreme(found, n, rec_phase[piece] + omega * middle, value, sign)
+                found, n = append_extreme(found, n, rec.phase[piece] + omega * middle, value, sign)
                 sign = new_sign
             elif (
                 kind == FLIGHT and rate_old * rate > 0.0 and (i == 1 or rate_older * rate_old > 0.0)
@@ -274,7 +315,7 @@ def local_extremes(
                     lo, rate_lo = t_old, rate_old
                     state_at(blocks, tab, kind, h, start, shares, AT_ONCE * t, v)
                     value, slope = output_rate(
-                        row, row1, terms, forced, omega, rec_phase[piece] + omega * AT_ONCE * t,
+                        row, row1, terms, forced, omega, rec.phase[piece] + omega * AT_ONCE * t,
                         AT_ONCE * t, v,
                     )  # fmt: skip
                     slope = (slope - rate_old) / (AT_ONCE * t)
@@ -287,14 +328,14 @@ def local_extremes(
                         break
                     state_at(blocks, tab, kind, h, start, shares, where, v)
                     value, rate_where = output_rate(
-                        row, row1, terms, forced, omega, rec_phase[piece] + omega * where, where, v
+                        row, row1, terms, forced, omega, rec.phase[piece] + omega * where, where, v
                     )
                     if where < middle:
                         hi, rate_hi = middle, rate_middle
                     else:
                         lo, rate_lo = middle, rate_middle
                     if rate_where * sign < 0.0:
-                        phase = rec_phase[piece]
+                        phase = rec.phase[piece]
                         first, value = turning_point(
                             blocks, tab, kind, h, start, shares, row, row1, terms, forced, omega,
                             phase, h / pieces, sign, lo, where, rate_lo, rate_where, v,
@@ -311,7 +352,7 @@ def local_extremes(
             t_older, rate_older = t_old, rate_old
             t_old, rate_old = t, rate
     if sign != first_sign:
-        found, n = append_extreme(found, n, rec_phase[0], first_value, sign)
+        found, n = append_extreme(found, n, rec.phase[0], first_value, sign)
     return found[:n]
 
 
