@@ -9,6 +9,7 @@ from __future__ import annotations
 import copy
 import itertools
 import math
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -427,7 +428,8 @@ class FlowMap:
         )
 
     def _check_segments(self, nodes: Real, phases: Real, omega: float, chained: bool) -> None:
-        if phases.ndim != 1 or phases.size < 2 or not (phases[1:] > phases[:-1]).all():
+        ends = phases.tolist() if phases.ndim == 1 else []
+        if len(ends) < 2 or not all(map(operator.lt, ends, ends[1:])):
             raise SystemModelError("phases must be two or more ascending numbers")
         size = 2 * self.system.size
         rows = 1 if chained else phases.size - 1
@@ -436,7 +438,7 @@ class FlowMap:
                 f"nodes must have shape ({rows}, {size}) for {phases.size - 1} segments of "
                 f"{self.system.size} modes, got {nodes.shape}"
             )
-        if not math.isfinite(nodes.sum() + phases[-1] - phases[0]):
+        if not math.isfinite(float(nodes.sum()) + ends[-1] - ends[0]):
             raise SystemModelError("nodes and phases must be finite")
         full = 2.0 * math.pi
         if not (
@@ -539,7 +541,7 @@ class FlowMap:
         nodes, phases = _floats("nodes", nodes), np.ascontiguousarray(_floats("phases", phases))
         self._check_segments(nodes, phases, omega, chained)
         return self._call(
-            record, recording, float(omega), np.append(nodes, 0.0), phases, chained, sensitivities,
+            record, recording, float(omega), _with_zero(nodes), phases, chained, sensitivities,
             parameters,
         )  # fmt: skip
 
@@ -628,6 +630,13 @@ class FlowMap:
             np.empty((capacity, len(self._pushed), self.tables.nodes.size)),
             np.zeros(3, dtype=np.int64),
         )
+
+
+def _with_zero(nodes: Real) -> Real:
+    """The numbers of the nodes, and a zero in the place of ln ω."""
+    point = np.zeros(nodes.size + 1)
+    point[:-1] = nodes.ravel()
+    return point
 
 
 def _remember(pieces: Record, record: Record) -> None:
@@ -740,7 +749,7 @@ class Trajectory:
         legs = np.stack([rec.phase[start], phases[inside]], axis=1).ravel()
         nodes = np.repeat(rec.start[start], 2, axis=0)[:-1]
         status, *_, ends, _, _, _, _ = flow._call(
-            flow.no_record, False, self.omega, np.append(nodes, 0.0), legs, False, False, ()
+            flow.no_record, False, self.omega, _with_zero(nodes), legs, False, False, ()
         )
         return (inside, ends[::2]) if status == OK else none
 

@@ -58,6 +58,13 @@ def there_and_back(block, t):
         d00, d11 = less + size * (swing + a), less + size * (swing - a)
         return e00, e01, e10, e11, i00, i01, i10, i11, d00, d11
     s, c = math.sin(0.5 * rate * t), math.cos(0.5 * rate * t)
+    return swung_there_and_back(block, rate, less, size, s, c)
+
+
+@inner
+def swung_there_and_back(block, rate, less, size, s, c):
+    """The same of a block that swings: by its decay, and that less 1, and by half its phase."""
+    half = 0.5 * (block[0, 0] - block[1, 1])
     swing, odd = -2.0 * s * s, 2.0 * s * c / rate  # cos - 1, sin / rate
     even = 1.0 + swing
     a, b, c, d = odd * half, odd * block[0, 1], odd * block[1, 0], 1.0 / size
@@ -66,6 +73,89 @@ def there_and_back(block, t):
         d * (even - a), -d * b, -d * c, d * (even + a),
         less + size * (swing + a), less + size * (swing - a),
     )  # fmt: skip
+
+
+@inner
+def swings(block, times, decay, less, sine, cosine):
+    """Fill what `swung_there_and_back` needs at some times (m,); its rate, or 0 for two decays."""
+    mean = 0.5 * (block[0, 0] + block[1, 1])
+    half = 0.5 * (block[0, 0] - block[1, 1])
+    square = half * half + block[0, 1] * block[1, 0]
+    if square >= 0.0:
+        return 0.0
+    rate, m = math.sqrt(-square), times.size
+    for i in range(m):
+        less[i] = mean * times[i]  # for the time being
+        decay[i] = 0.5 * rate * times[i]
+    sines(decay, sine, cosine)
+    if abs(less[m - 1]) < SLOW_DECAY:
+        series_expm1(less, less)
+        for i in range(m):
+            decay[i] = 1.0 + less[i]
+    else:
+        for i in range(m):
+            decay[i], less[i] = math.exp(less[i]), math.expm1(less[i])
+    return rate
+
+
+# π/2 in three parts, of which multiples by whole numbers up to 2^20 are exact [Cody and Waite 1980]
+HALF_TURN = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624871116645580e-21)
+WHOLE = 6755399441055744.0  # 1.5 2^52: a sum with it has no fraction
+# coefficients of sin and cos up to π/4, the errors of which are below rounding [Ng, fdlibm 5.3]
+SINE = (
+    -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
+    2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10,
+)  # fmt: skip
+COSINE = (
+    4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
+    -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11,
+)  # fmt: skip
+SLOW_DECAY = 0.35  # exponent up to which `series_expm1` is exact
+
+
+@inner
+def sines(x, sine, cosine):
+    """Fill sines and cosines of x (m,), of up to 1e6; without calls, so that several go at once."""
+    for i in range(x.size):
+        k = (x[i] * (2.0 / math.pi) + WHOLE) - WHOLE
+        r = ((x[i] - k * HALF_TURN[0]) - k * HALF_TURN[1]) - k * HALF_TURN[2]
+        z = r * r
+        s, c = SINE[5], COSINE[5]
+        s, c = SINE[4] + z * s, COSINE[4] + z * c
+        s, c = SINE[3] + z * s, COSINE[3] + z * c
+        s, c = SINE[2] + z * s, COSINE[2] + z * c
+        s, c = SINE[1] + z * s, COSINE[1] + z * c
+        s, c = SINE[0] + z * s, COSINE[0] + z * c
+        s, c = r + r * z * s, 1.0 - (0.5 * z - z * z * c)
+        half = 0.5 * k
+        odd = half != (half + WHOLE) - WHOLE
+        turns = 0.5 * (half - 0.5) if odd else 0.5 * half
+        back = turns != (turns + WHOLE) - WHOLE
+        a, b = (c, -s) if odd else (s, c)
+        sine[i] = -a if back else a
+        cosine[i] = -b if back else b
+
+
+@inner
+def series_expm1(x, out):
+    """Fill exp(x) - 1 by its power series, for |x| < `SLOW_DECAY`; without calls."""
+    for i in range(x.size):
+        total = 0.0
+        total = x[i] * (1.0 / 15.0) * (1.0 + total)
+        total = x[i] * (1.0 / 14.0) * (1.0 + total)
+        total = x[i] * (1.0 / 13.0) * (1.0 + total)
+        total = x[i] * (1.0 / 12.0) * (1.0 + total)
+        total = x[i] * (1.0 / 11.0) * (1.0 + total)
+        total = x[i] * (1.0 / 10.0) * (1.0 + total)
+        total = x[i] * (1.0 / 9.0) * (1.0 + total)
+        total = x[i] * (1.0 / 8.0) * (1.0 + total)
+        total = x[i] * (1.0 / 7.0) * (1.0 + total)
+        total = x[i] * (1.0 / 6.0) * (1.0 + total)
+        total = x[i] * (1.0 / 5.0) * (1.0 + total)
+        total = x[i] * (1.0 / 4.0) * (1.0 + total)
+        total = x[i] * (1.0 / 3.0) * (1.0 + total)
+        total = x[i] * (1.0 / 2.0) * (1.0 + total)
+        out[i] = x[i] * (1.0 + total)
 
 
 @inner

@@ -15,8 +15,10 @@ from nldyn.flow.kernels.flights import (
     free_output,
     output_derivatives,
     swelling,
+    swings,
     swollen,
     swung,
+    swung_there_and_back,
     there_and_back,
     turned,
 )
@@ -89,11 +91,20 @@ def panel_responses(fl, tab, kind, h, panel):
     if panel.made[0] == kind and panel.made[1] == h:
         return
     panel.made[0], panel.made[1] = kind, h
+    times, waves = np.empty(m), np.empty((4, m))
     for i in range(m):
-        t = h * tab.chi[kind, i]
-        for b in range(fl.blocks.shape[0]):
-            j = 2 * b
-            e00, e01, e10, e11, i00, i01, i10, i11, d00, d11 = there_and_back(fl.blocks[b], t)
+        times[i] = h * tab.chi[kind, i]
+    decay, less, sine, cosine = waves[0], waves[1], waves[2], waves[3]
+    for b in range(fl.blocks.shape[0]):
+        j, block = 2 * b, fl.blocks[b]
+        rate = swings(block, times, decay, less, sine, cosine)
+        for i in range(m):
+            if rate > 0.0:
+                e00, e01, e10, e11, i00, i01, i10, i11, d00, d11 = swung_there_and_back(
+                    block, rate, less[i], decay[i], sine[i], cosine[i]
+                )
+            else:
+                e00, e01, e10, e11, i00, i01, i10, i11, d00, d11 = there_and_back(block, times[i])
             for o in range(to.shape[0]):
                 stop = panel.active[o % na]
                 order = output_order(fl, stop, o // na)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from independent import exact_flight, state_map
 
 from nldyn import Damper, FlowMap, HarmonicForce, System, Unbalance
+from nldyn.flow.kernels.flights import SLOW_DECAY, series_expm1, sines
 from nldyn.system.linear import _growth
 
 RNG = np.random.default_rng(1)
@@ -162,3 +163,15 @@ def test_segments_chained_and_apart_agree(one_dof):
     np.testing.assert_array_equal(chained.jacobians, apart.jacobians)
     plain = flow.shoot(start[None], phases, omega, chained=True, sensitivities=False)
     np.testing.assert_array_equal(plain.ends, apart.ends)
+
+
+def test_sines_and_decays_of_a_panel_are_good_to_the_last_digit():
+    x = np.concatenate([RNG.uniform(-1e4, 1e4, 400), np.arange(-40, 41) * np.pi / 2, [1e-300, 0.0]])
+    sine, cosine = np.empty((2, x.size))
+    sines.py_func(x, sine, cosine)
+    assert np.abs(sine - np.sin(x)).max() < 2.3e-16  # each within one unit of its last place
+    assert np.abs(cosine - np.cos(x)).max() < 2.3e-16
+    small = SLOW_DECAY * np.concatenate([np.linspace(-1.0, 1.0, 401), [1e-12, -1e-300]])
+    grown = np.empty(small.size)
+    series_expm1.py_func(small, grown)
+    np.testing.assert_allclose(grown, np.expm1(small), rtol=1e-15, atol=0)
