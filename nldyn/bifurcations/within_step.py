@@ -179,9 +179,7 @@ def looked_into(
     return [*first, middle, *looked_into(a, middle, b, c, most - 1)]
 
 
-def resolved(
-    a: BranchNode, b: BranchNode, least: int, most: int, far: float
-) -> list[BranchNode]:
+def resolved(a: BranchNode, b: BranchNode, least: int, most: int, far: float) -> list[BranchNode]:
     """Points between two others, halved at least so often, until no multiplier moves far."""
     before, after = a.orbit.multipliers, b.orbit.multipliers
     if most == 0 or (least <= 0 and max(travel(before, after), travel(after, before)) <= far):

@@ -280,6 +280,13 @@ class FlowMap:
         return s.ride(s.interfaces[place], omega) if observed else NO_RIDE
 
     @cached_property
+    def first_alike(self) -> list[int]:
+        """For each output the first one of the same row: an interface may be where a stop is."""
+        riding = len(self.rows) if self.system.rides else 0
+        keys = [(place if riding else None, row.tobytes()) for place, row in enumerate(self.rows)]
+        return [keys.index(key) for key in keys]
+
+    @cached_property
     def rate_rows(self) -> Real:
         """Rows of the outputs' velocities in flight."""
         return self.system.linear.times_block(self.rows)
@@ -779,8 +786,15 @@ class Trajectory:
         """The same with the values of the recorded polynomials, in contacts good to 1e-6."""
         flow = self.flow
         check_whole("output", output, 0, len(flow.rows) - 1)
-        ride = flow.ride(output, self.omega)
-        return self._evaluate(local_extremes, ride, output)
+        first = flow.first_alike[output]
+        if first not in self._extremes:
+            ride = flow.ride(first, self.omega)
+            self._extremes[first] = self._evaluate(local_extremes, ride, first)
+        return self._extremes[first]
+
+    @cached_property
+    def _extremes(self) -> dict[int, Real]:
+        return {}
 
     def with_exact_values(self, found: Real, output: int, wanted: NDArray[np.bool_]) -> Real:
         """Extremes (k, 3) of an output, those wanted (k,) with the values of the flow map."""

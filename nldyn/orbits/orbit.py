@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -403,18 +404,29 @@ class Orbit:
     @cached_property
     def max_abs_displacement(self) -> float:
         """Largest absolute displacement of the observed interface in m."""
-        values = self.observed_extremes.values
-        return float(np.max(np.abs(values))) if values.size else 0.0
+        output = self.system.output(self.observe)
+        return self._highest(output, lambda found: np.abs(found.values))
 
     @cached_property
     def max_penetration(self) -> float:
         """Deepest penetration over all stops in m (zero if none is touched)."""
-        values = [
-            float(p.values.max())
-            for stop, p in zip(self.system.stops, self.penetration_peaks, strict=True)
-            if p.values.size and not isinstance(stop, RigidStop)
-        ]
-        return max(0.0, *values) if values else 0.0
+        heights = (
+            self._highest(index, lambda found: np.where(found.is_maximum, found.values, 0.0))
+            for index, stop in enumerate(self.system.stops)
+            if not isinstance(stop, RigidStop)
+        )
+        return max(heights, default=0.0)
+
+    def _highest(self, output: int, height: Callable[[Extremes], Real]) -> float:
+        """Largest height of an output's extremes; only those that may have it are solved for."""
+        if output in self._extremes:
+            return float(height(self._extremes[output]).max(initial=0.0))
+        found = self.trajectory.recorded_extremes(output)
+        extremes = self._as_extremes(found, output)
+        heights, error = height(extremes), SHALLOW * np.abs(extremes.values).max(initial=0.0)
+        near = heights >= heights.max(initial=0.0) - error
+        exact = self.trajectory.with_exact_values(found, output, near)
+        return float(height(self._as_extremes(exact[near], output)).max(initial=0.0))
 
     @cached_property
     def impacts(self) -> int:

@@ -38,6 +38,7 @@ class TimeLimit:
         self.frequency_hz = frequency_hz
         self.tell = progress or silent
         self._start = time.thread_time() - compilations.seconds()
+        self._looked = 0.0  # time spent at the last look
 
     def __repr__(self) -> str:
         return f"<TimeLimit: {self.spent:.3g} of {self.seconds:g} s spent>"
@@ -53,9 +54,10 @@ class TimeLimit:
         Raises
         ------
         OutOfTimeError
-            If the time is spent.
+            If the time is spent, or would be after as much as since the last look.
         """
         spent = self.spent
-        if spent > self.seconds:
+        if 2.0 * spent - self._looked > self.seconds:
             raise OutOfTimeError(what)
+        self._looked = spent
         self.tell(what, self.frequency_hz, max(spent, 0.0) / self.seconds)

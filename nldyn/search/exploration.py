@@ -330,8 +330,7 @@ class Exploration:
         if not self.finished:
             turn, steps, length = self.question.place(self.stage.steps)
             lines.append(
-                f"not finished: {steps} of {length} steps up and down of round {turn + 1} are "
-                "done"
+                f"not finished: {steps} of {length} steps up and down of round {turn + 1} are done"
             )
         lines += self._rounds()
         open_ranges = ", ".join(

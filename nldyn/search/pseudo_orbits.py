@@ -82,9 +82,7 @@ class PseudoOrbits:
         """
         pieces = Pieces.of(branches, place.frequency_hz, place.spacing)
         for period in place.periods:
-            for sequence in islice(
-                pieces.pseudo_orbits(period, MOST_ALIKE, place.rng), self.tries
-            ):
+            for sequence in islice(pieces.pseudo_orbits(period, MOST_ALIKE, place.rng), self.tries):
                 box.tell(self.what, place.frequency_hz)
                 chosen = list(sequence)
                 nodes = pieces.nodes[chosen]
