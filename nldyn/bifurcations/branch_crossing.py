@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from nldyn.bifurcations.point import SpecialPoint
@@ -12,6 +14,7 @@ from nldyn.orbits.shooting import metric_length
 CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
 ON_CROSSING = 3e-7  # distance from one, relative to the orbit, at which a branch cannot be told
 NEAR_CRITICAL = 1e-3  # a multiplier no nearer to 1 or -1 is not that of a special point
+FIRST_STEP = 100.0  # of a distance: Newton's method steps no farther to a crossing within it
 NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
 SHORTEST_CROSSING = 3e-6  # step over which a branch may cross another one
 SAME = 2.0 * SHORTEST_CROSSING  # distance of branch points that two such steps locate as one
@@ -33,15 +36,18 @@ def lies_on_crossing(orbit: Orbit, within: float) -> bool:
 
 def crossing_within(orbit: Orbit, within: float) -> Orbit | None:
     """Where branches cross within a distance of an orbit, relative to it, if they do."""
-    crossing = crossing_beside(orbit)
+    crossing = crossing_beside(orbit, FIRST_STEP * within)
     return crossing if crossing is not None and distance(orbit, crossing) < within else None
 
 
-def crossing_beside(orbit: Orbit) -> Orbit | None:
-    """Where branches cross beside an orbit that has a multiplier near 1, if they do."""
+def crossing_beside(orbit: Orbit, first_step: float = math.inf) -> Orbit | None:
+    """Where branches cross beside an orbit that has a multiplier near 1, if they do.
+
+    It is given up where the first step towards it is longer than said.
+    """
     if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_CRITICAL:
         return None
-    return true_crossing(orbit)
+    return true_crossing(orbit, first_step)
 
 
 def distance(a: Orbit, b: Orbit) -> float:
@@ -49,9 +55,9 @@ def distance(a: Orbit, b: Orbit) -> float:
     return metric_length(a.problem.metric(a.point), b.point - a.point)
 
 
-def true_crossing(orbit: Orbit) -> Orbit | None:
+def true_crossing(orbit: Orbit, first_step: float = math.inf) -> Orbit | None:
     """Where branches cross beside an orbit, if they do."""
-    crossing = nearest_crossing(orbit)
+    crossing = nearest_crossing(orbit, first_step)
     return crossing[0] if crossing is not None and crossing[1] <= CROSSES else None
 
 

@@ -443,6 +443,7 @@ def correct(
     level: float = 0.0,
     *,
     max_iterations: int = ITERATIONS,
+    first_step: float = math.inf,
 ) -> Corrected:
     """Newton's method for R = 0, g = 0 and, if a row is given, ``row @ point = level``.
 
@@ -460,6 +461,8 @@ def correct(
         Offset of the plane.
     max_iterations : int
         Most steps.
+    first_step : float
+        Relative length of the first step, beyond which none is made.
 
     Returns
     -------
@@ -474,6 +477,8 @@ def correct(
             before = step
             change, slopes = _newton_step(family.at(point), condition, slopes, row, level)
             step = metric_length(family.metric(point), change)
+            if iteration == 1 and step > first_step:
+                raise ConvergenceError("the first step is too long")
             point = point + change
             if not step < 2.0:
                 raise ConvergenceError("Newton's method diverged")

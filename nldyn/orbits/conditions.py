@@ -559,17 +559,18 @@ class Held:
         return self
 
 
-def nearest_crossing(orbit: Orbit) -> tuple[Orbit, float] | None:
+def nearest_crossing(orbit: Orbit, first_step: float = math.inf) -> tuple[Orbit, float] | None:
     """The crossing of branches beside an orbit, and its unfolding relative to the orbit.
 
     The unfolding is what must be added to the shooting equations for branches to cross: zero, but
-    for rounding, where they do. None where no crossing is found.
+    for rounding, where they do. None where no crossing is found, or where the first step of
+    Newton's method, which is about the distance, is longer than said.
 
     References
     ----------
     G. Moore (1980), *Numer. Funct. Anal. Optim.* 2, 441-472.
     """
-    found = _beside("BP", orbit)
+    found = _beside("BP", orbit, first_step)
     if found is None:
         return None
     return replace(found.orbit, problem=orbit.problem), abs(float(found.at.point[-1]))
@@ -587,14 +588,14 @@ def nearest_grazing(orbit: Orbit) -> Orbit | None:
     return None if found is None else replace(found.orbit, problem=orbit.problem)
 
 
-def _beside(kind: str, orbit: Orbit) -> Corrected | None:
+def _beside(kind: str, orbit: Orbit, first_step: float = math.inf) -> Corrected | None:
     """The special point of a kind beside an orbit."""
     hz = orbit.frequency_hz
     family = OrbitFamily.around(orbit, (Chart(Parameter(FREQUENCY), 0.5 * hz, 2.0 * hz),))
     try:
         family, condition = defined_by(kind, family, orbit)
         guess = family.unknowns(orbit)
-        found = correct(family, guess, condition)
+        found = correct(family, guess, condition, first_step=first_step)
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
         return None
     apart = metric_length(family.metric(guess), found.at.point - guess)
