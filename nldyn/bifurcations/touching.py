@@ -14,11 +14,10 @@ from nldyn.bifurcations.point import BranchNode
 from nldyn.orbits.bordered import length_unit
 from nldyn.orbits.extremes import alone, nearest, sign_changes
 from nldyn.orbits.orbit import Extremes, Orbit
-from nldyn.system.rigid_stop import RigidStop
+from nldyn.system.rigid_stop import RigidStop, touched_sharply
 from nldyn.system.system import System
 
 EXACT = 1e-9  # of an orbit's size: depth of a touch that is solved for
-SMOOTH_TOUCH = 1.5  # exponent of a stop from which on multipliers have a slope at a touch
 
 
 @dataclass(frozen=True)
@@ -111,5 +110,5 @@ def _maxima(found: Extremes) -> tuple[Real, Real]:
 
 
 def touches_sharply(system: System) -> bool:
-    """Whether a stop is so stiff from the first touch that multipliers have no slope there."""
-    return any(isinstance(s, RigidStop) or s.exponent < SMOOTH_TOUCH for s in system.stops)
+    """Whether there is a stop that is touched sharply, see `touched_sharply`."""
+    return any(map(touched_sharply, system.stops))

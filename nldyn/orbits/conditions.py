@@ -29,7 +29,7 @@ from nldyn.orbits.shooting import metric_length
 from nldyn.system.chart import FREQUENCY, Chart
 from nldyn.system.loads import BaseMotion, ConstantForce, HarmonicForce, Unbalance
 from nldyn.system.parameters import Parameter
-from nldyn.system.rigid_stop import RigidStop
+from nldyn.system.rigid_stop import RigidStop, touched_sharply
 from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
@@ -40,7 +40,7 @@ TOUCH = 1e-6  # of an orbit's size: depth of a touch beside its grazing point
 LEVEL, ALIKE = 1e-4, 1e-9  # relative difference of two extremes about to change places, or one
 SAME_EXTREME = 1e-2  # rad between an extreme and itself on a neighbouring orbit
 ALL_GRAZE = 1e-4  # of an orbit's size: depth in each excitation period that grazes in each
-CLEAR = 1e-12  # of an orbit's size: distance to a rigid stop that counts as none, and is no impact
+CLEAR = 1e-12  # of an orbit's size: distance to a sharp touch that counts as none
 WIDEST_PASSAGE = 0.5  # rad on either side of a grazing, in which a rigid stop is not there
 SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
 FARTHEST = 0.01  # of the orbit's size: depth of an extreme that may be said to graze
@@ -267,8 +267,14 @@ class Grazing:
         return Passage(self.stop, self.phase, self.half, self.every) if self.half else None
 
     def value(self, at: Evaluation) -> Real:
-        """Depth of the extreme, shape (1,)."""
-        clear = CLEAR if self.half else 0.0
+        """Depth of the extreme, shape (1,).
+
+        With a touch of depth d of a stop that is stiff from the first touch on, Jacobians change
+        with its root, and so would show the rounding of d = 0; those of a contact that does not
+        quite begin, or split, do not. An impact with a rigid stop does not quite happen either.
+        """
+        sharp = touched_sharply(at.family.system.stops[self.stop])
+        clear = (CLEAR if self.is_maximum else -CLEAR) if sharp else 0.0
         return np.array([self._reached(at)[1] / self.unit - self.depth + clear])
 
     def _reached(self, at: Evaluation) -> tuple[float, float]:

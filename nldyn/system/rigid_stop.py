@@ -15,6 +15,7 @@ from nldyn.system.values import check_sides
 
 Restitution = Callable[[float], tuple[float, float]]
 TRIED_SPEEDS = tuple(10.0**k for k in range(-12, 4))  # m/s
+SMOOTH_TOUCH = 1.5  # exponent of a stop from which on multipliers have a slope at a touch
 STEP, WRONG_SLOPE, DIGITS = 1e-5, 1e-3, 1e-10  # of the differences that check a law's derivative
 
 
@@ -117,6 +118,11 @@ class RigidStop:
 
 
 AnyStop = Stop | RigidStop
+
+
+def touched_sharply(stop: AnyStop) -> bool:
+    """Whether a stop is so stiff from the first touch that multipliers have no slope there."""
+    return isinstance(stop, RigidStop) or stop.exponent < SMOOTH_TOUCH
 
 
 def is_linear(stop: AnyStop) -> bool:
