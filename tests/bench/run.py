@@ -18,6 +18,7 @@ from bench.page import Row, write_page
 from bench.studies import BranchTime
 from bench.targets import (
     all_targets,
+    atlas_target,
     fastest_rows,
     impact_target,
     ratio_rows,
@@ -68,6 +69,8 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
     tell("impacts with many modes, searches in vain")
     impacts = studies.impact_times()
     searches = studies.vain_searches()
+    tell("sample of the atlas")
+    atlas = studies.atlas_times()
     tell("plain simulation, threads")
     resonance = throughput.resonance_rates()
     plain = [r for model in models if model in throughput.MODELS for r in throughput.measure(model)]
@@ -77,7 +80,12 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
     default = setting_label(FlowOptions())
     targets = all_targets(samples, default, branches, modes, grazing, profiles["one_dof"], first)
     targets += throughput_targets(plain)
-    targets += [resonance_target(resonance), impact_target(impacts), *search_targets(searches)]
+    targets += [
+        resonance_target(resonance),
+        impact_target(impacts),
+        *search_targets(searches),
+        atlas_target(atlas),
+    ]
     rivals = [e.name for e in ENGINES if e.has_monodromy]
     tables: dict[str, Sequence[Row]] = {
         "Targets": [vars(t) for t in targets],
@@ -104,6 +112,15 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
         ],
         "Searches in vain": [
             {"modes": str(s.modes), "seconds": f"{s.seconds:.1f}", "says": s.said} for s in searches
+        ],
+        "Sample of the atlas": [
+            {
+                "model": a.model,
+                "orbits followed": str(a.orbits),
+                "ms an orbit": f"{1e3 * a.seconds / a.orbits:.1f}",
+                "min for all": f"{a.minutes:.0f}",
+            }
+            for a in atlas
         ],
         "Branches": [*map(branch_row, branches), *auto_times()],
         "Special points": special_point_rows(branches[0]),

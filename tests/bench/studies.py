@@ -31,6 +31,9 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
+from nldyn.paper.atlas import CHARTS, LONG, odd_part
+from nldyn.paper.jobs import scene_system
+from nldyn.paper.starts import follow_starts, read_starts
 from nldyn.system.loads import HarmonicForce
 from nldyn.system.stop import Stop
 from nldyn.system.system import System
@@ -298,6 +301,43 @@ def vain_searches() -> list[VainSearch]:
         except ConvergenceError as error:
             vain, said = True, str(error)
         found.append(VainSearch(modes, time.process_time() - start, vain, said))
+    return found
+
+
+# The atlas of the paper
+
+ATLAS_SHARE = 60  # of so many starts of each family of a chart one is followed
+
+
+@dataclass(frozen=True)
+class AtlasTime:
+    """A sample of a chart of the atlas: processor time for its orbits, and all orbits there are."""
+
+    model: str
+    seconds: float
+    orbits: int
+    all_orbits: int
+
+    @property
+    def minutes(self) -> float:
+        """Processor time of the whole chart in min, if all of its orbits take as long."""
+        return self.seconds / self.orbits * self.all_orbits / 60.0
+
+
+def atlas_times() -> list[AtlasTime]:
+    """Every sixtieth start of each model's atlas, with all branches that it leads to."""
+    found = []
+    for chart in CHARTS:
+        system, starts = scene_system(chart.name), read_starts(chart.name)
+        begun = time.process_time()
+        parts = [
+            follow_starts(system, of_family[::ATLAS_SHARE], chart.range_hz, LONG, chart.doubled)
+            for family in chart.families
+            if (of_family := [start for start in starts if odd_part(start.period) == family])
+        ]
+        seconds = time.process_time() - begun
+        orbits = sum(len(branch.points) for part in parts for branch in part.branches)
+        found.append(AtlasTime(chart.name, seconds, orbits, chart.orbits))
     return found
 
 

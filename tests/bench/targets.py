@@ -11,6 +11,7 @@ from bench.engines import NLDYN
 from bench.measure import Sample, curve
 from bench.ratios import seconds_at, times_faster
 from bench.studies import (
+    AtlasTime,
     BranchTime,
     FirstCall,
     GrazingError,
@@ -217,6 +218,13 @@ def impact_target(impacts: Sequence[ImpactTime]) -> Target:
         f"{growth:.1f} times",
         growth <= 4.0,
     )
+
+
+def atlas_target(sample: Sequence[AtlasTime]) -> Target:
+    """Processor time of the whole atlas, by a sample of its starts."""
+    minutes = sum(chart.minutes for chart in sample)
+    goal = "20 min of processor time"
+    return target("the atlas, by a sample", goal, f"{minutes:.0f} min", minutes <= 20.0)
 
 
 def search_targets(searches: Sequence[VainSearch]) -> list[Target]:
