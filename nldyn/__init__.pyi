@@ -3,7 +3,6 @@
 Each name stands with its home, from which it is loaded when it is first asked for.
 """
 
-# base: errors
 # sub-packages, each with the list of what else it offers
 from nldyn import bifurcations as bifurcations
 from nldyn import branches as branches
@@ -17,6 +16,8 @@ from nldyn import runtime as runtime
 from nldyn import scene as scene
 from nldyn import search as search
 from nldyn import system as system
+
+# base: errors
 from nldyn.base.errors import ConvergenceError as ConvergenceError
 from nldyn.base.errors import LocateError as LocateError
 from nldyn.base.errors import SceneError as SceneError

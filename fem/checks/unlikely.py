@@ -17,9 +17,9 @@ from fem.model.parts import BeamPart
 from fem.model.structure import StructureModel
 
 THICK = 0.5
+"""Thickness of a shell over the side of a square of its area."""
 DIRECTIONS = 1e5  # steps of a component, within one of which two directions are the same
 FLAT = 1e-9  # of the largest: area of a facet that has none
-"""Thickness of a shell over the side of a square of its area."""
 
 
 class UnlikelyWarning(UserWarning):

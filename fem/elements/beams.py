@@ -29,8 +29,8 @@ UPRIGHT = np.array([0, 0, 1.0])
 IN_PLANE = np.array([1, 5, 7, 11])
 OUT_OF_PLANE = np.array([2, 4, 8, 10])
 TURNED_SIGNS = np.array([1.0, -1.0, 1.0, -1.0])
-ALONG = 1e-6  # sine of the angle between two directions that are one
 """A positive rotation about the local y lowers w along x."""
+ALONG = 1e-6  # sine of the angle between two directions that are one
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ LIFT = 1.5
 COEFFICIENTS = (1.0, 2.0, 1.0, 0.0, 1.0, -1.0, -1.0, -1.0, -2.0)
 """Felippa's beta_1 to beta_9."""
 CORNERS = ((0, 1, 2, 3, 4, 5, 6, 7, 8), (8, 6, 7, 2, 0, 1, 5, 3, 4), (4, 5, 3, 7, 8, 6, 1, 2, 0))
-LEAST_WEIGHT = 0.01  # of the higher strains, which vanish at a Poisson's ratio of 1/2
 """Which of the coefficients relate strains along the edges at a corner to the rotations."""
+LEAST_WEIGHT = 0.01  # of the higher strains, which vanish at a Poisson's ratio of 1/2
 
 
 def membrane_rows(

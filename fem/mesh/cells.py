@@ -33,8 +33,8 @@ FACET_KINDS = {
     (4, 8): "quad8",
     (4, 9): "quad9",
 }
-SAME_PLACE = 1e-12  # distance of a node and a place of the unit cell that are one
 """Kinds of facets by their numbers of corners and of nodes."""
+SAME_PLACE = 1e-12  # distance of a node and a place of the unit cell that are one
 
 Indices = tuple[tuple[int, ...], ...]
 

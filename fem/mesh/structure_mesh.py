@@ -17,8 +17,8 @@ from fem.mesh.cells import CUBE, KINDS, PYRAMID, TETRAHEDRON, TRIANGLE, WEDGE
 from fem.mesh.frame_mesh import FrameMesh, index_sets, numbers
 
 POINTS, CELLS = " (points)", " (cells)"
-SAME_PLACE = 1e-9  # of the mesh: distance of nodes that are merged, unless given
 """After a name that a point set and a group share, to tell which is meant."""
+SAME_PLACE = 1e-9  # of the mesh: distance of nodes that are merged, unless given
 
 
 @dataclass(frozen=True, eq=False, repr=False)

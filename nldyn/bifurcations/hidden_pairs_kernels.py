@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from nldyn.base import arrays
 from nldyn.base.arrays import TINY, Real
 from nldyn.flow.kernels.compiling import inner, njit
 from nldyn.orbits import critical_functions
@@ -14,7 +15,9 @@ from nldyn.orbits.critical_functions import LEAST_MODULUS, NEAR_CIRCLE, number_o
 from nldyn.orbits.periodic_schur import product_eigenvalues
 from nldyn.runtime.kernel_cache import resting_on
 
-compiled = resting_on(njit(cache=True, error_model="numpy"), critical_functions.__file__)
+compiled = resting_on(
+    njit(cache=True, error_model="numpy"), critical_functions.__file__, arrays.__file__
+)
 
 
 @compiled

@@ -320,7 +320,7 @@ def start_point(orbit: Orbit, direction: float, range_hz: tuple[float, float]) -
     if lies_on_crossing(orbit, ON_CROSSING):
         raise ConvergenceError(
             f"branches cross at the orbit at {orbit.frequency_hz:g} Hz: begin farther from there, "
-            "or with one of switch_at_branch_point"
+            "or with one of switch_branch"
         )
     problem = orbit.problem
     towards = np.zeros(orbit.point.size)

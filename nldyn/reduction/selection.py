@@ -188,9 +188,7 @@ def select_modes(
        both differences together make the band. So it is for folds and flips.
     """
     if not (is_finite(tolerance) and FINEST <= tolerance < 1.0):
-        raise SystemModelError(
-            f"tolerance must lie in [{FINEST:g}, 1), got {shown(tolerance)}"
-        )
+        raise SystemModelError(f"tolerance must lie in [1e-6, 1), got {shown(tolerance)}")
     visible = candidate_modes(component, setting)
     whole, seen, cutoff = visible.whole, visible.seen, visible.cutoff_hz
     shares = Shares(progress or silent, {"reference": 3.0, "modes": 1.0})

@@ -11,11 +11,13 @@ SAME_ENTRY, ZERO_ENTRY = 1e-10, 1e-12
 
 
 def check_finite(owner: str, name: str, value: float) -> None:
+    """Refuse what is no finite number."""
     if not is_finite(value):
         raise SystemModelError(f"{owner}: {name} must be a finite number, got {shown(value)}")
 
 
 def check_positive(owner: str, name: str, value: float) -> None:
+    """Refuse what is no finite number above zero."""
     check_finite(owner, name, value)
     if value <= 0.0:
         raise SystemModelError(f"{owner}: {name} must be positive, got {value:g}")
