@@ -48,6 +48,10 @@ def special_points_between(
         If an orbit is not found where it should be.
     """
     if passes_node(a, b) and not differs(a, b):
+        if may_hide(before, a, b, after):
+            raise LocateError(
+                "two of them may lie within one step, in which an impact passes a phase of shooting"
+            )
         return []
     together = special_points_at_grazing(a, b)
     if together:
@@ -70,7 +74,8 @@ def special_points_between(
 def passes_node(a: BranchNode, b: BranchNode) -> bool:
     """Whether an impact with a rigid stop passes a phase of shooting between two points.
 
-    The state there jumps to that on the other side of the impact, over a step of no length.
+    The state there jumps to that on the other side of the impact, however short the step is. The
+    multipliers do not: they are those of the motion, wherever it is cut.
     """
     if not a.orbit.system.jumps:
         return False
@@ -79,6 +84,29 @@ def passes_node(a: BranchNode, b: BranchNode) -> bool:
     if way > MOST_BENT * abs(b.arclength - a.arclength):
         return True
     return bool((impacts_by_segment(a.orbit) != impacts_by_segment(b.orbit)).any())
+
+
+def may_hide(z: BranchNode | None, a: BranchNode, b: BranchNode, c: BranchNode | None) -> bool:
+    """Whether two special points may lie between a and b, by multipliers and extremes only.
+
+    That is where a multiplier moves far, or where a test or an extreme dips; the extremes of a body
+    that comes to rest are too many to be told apart. States and Jacobians of segments are not
+    used: they jump where an impact passes a phase of shooting.
+    """
+    before, after = a.orbit.multipliers, b.orbit.multipliers
+    far = FAR if before.size > 2 else FAR_ALONE
+    if max(travel(before, after), travel(after, before)) > far:
+        return True
+    low, high = sorted((a.arclength, b.arclength))
+    for triple in ((z, a, b), (a, b, c)):
+        if any(p is None for p in triple):
+            continue
+        dips = hidden_dips(*(p for p in triple if p is not None))
+        if any(p.orbit.rests for p in triple if p is not None):
+            dips = dips[: len(tests(a))]
+        if any(low < where < high for where in dips):
+            return True
+    return False
 
 
 def _inside(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
-from nldyn.flow.rigid import rigid_impacts
+from nldyn.flow.rigid import rigid_impacts, series_to_rest
 from nldyn.orbits.orbit import Orbit
 from nldyn.system.rigid_stop import RigidStop
 
@@ -43,10 +43,32 @@ def nodes_to_impacts(orbit: Orbit) -> float:
 
 
 def impacts_by_segment(orbit: Orbit) -> NDArray[np.intp]:
-    """Number of impacts with rigid stops in each segment of shooting, (k,)."""
-    problem = orbit.problem
-    segment = np.searchsorted(problem.phases, _impact_phases(orbit), side="right") - 1
-    return np.bincount(np.clip(segment, 0, None), minlength=problem.segments)
+    """Number of impacts with rigid stops in each segment of shooting, (k,).
+
+    Of a series that ends in rest, the last segment has infinitely many: only its first impact
+    counts there. An impact rounded onto the last phase of shooting is one of the last segment.
+    """
+    problem, motion = orbit.problem, orbit.trajectory
+    count = np.zeros(problem.segments, dtype=np.intp)
+    for index, stop in enumerate(orbit.system.stops):
+        if isinstance(stop, RigidStop):
+            hits = rigid_impacts(motion, index)
+            segment = np.searchsorted(problem.phases, hits.phase, side="right") - 1
+            segment = np.clip(segment, 0, problem.segments - 1)
+            follows = series_to_rest(motion, index, hits).follows
+            endless = follows & (segment == _last_of_series(segment, follows))
+            count += np.bincount(segment[~endless], minlength=problem.segments)
+    return count
+
+
+def _last_of_series(segment: NDArray[np.intp], follows: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Segment of the last impact of the series to which each belongs, round a period."""
+    last = segment.copy()
+    for i in range(2 * segment.size - 2, -1, -1):
+        here, following = i % segment.size, (i + 1) % segment.size
+        if follows[following]:
+            last[here] = last[following]
+    return last
 
 
 def start_far_from_impacts(orbit: Orbit) -> float:

@@ -1,16 +1,23 @@
 """Two special points of a kind within a step."""
 
 import numpy as np
+import pytest
 
 from nldyn import (
     ContinuationOptions,
     FlowMap,
+    HarmonicForce,
+    LocateError,
+    RigidStop,
     Stop,
     System,
     Unbalance,
     continue_branch,
+    impacts,
     solve_orbit,
 )
+from nldyn.bifurcations.within_step import differs, passes_node, special_points_between
+from nldyn.orbits.impact_phases import impacts_by_segment
 from nldyn.orbits.starts import orbit_near
 from nldyn.paper.jobs import scene_system
 from nldyn.search.fixed_point_index import _changes
@@ -68,3 +75,30 @@ def test_only_the_last_point_of_a_closed_branch_lies_beyond_its_start():
     order = np.argsort(ends, kind="stable")
     sums, widths = np.cumsum(rises[order]), np.diff(ends[order], append=np.inf)
     assert not sums[widths > 1e-9].any()
+
+
+def impact_oscillator():
+    return System.from_matrices(
+        [[1.0]], [[1.0]], {"x": [1.0]}, damping=[[0.1]],
+        stops=[RigidStop("x", 0.8, 0.3)], excitation=[HarmonicForce("x", 1.0)],
+    )  # fmt: skip
+
+
+def test_a_step_past_a_phase_of_shooting_in_which_multipliers_go_far_is_not_taken_for_searched():
+    """Ends of one kind, from 0.5 inside the unit circle to near 1, do not tell what is between."""
+    branch = continue_branch(solve_orbit(impact_oscillator(), 0.165), (0.144, 0.166))
+    last, first = (
+        min(branch.nodes, key=lambda node: abs(node.orbit.frequency_hz - hz))
+        for hz in (0.145, 0.16)
+    )
+    assert passes_node(first, last)
+    assert not differs(first, last)
+    with pytest.raises(LocateError, match="two of them may lie within one step"):
+        special_points_between(first, last)
+
+
+def test_what_is_cut_off_an_endless_series_of_impacts_passes_no_phase_of_shooting():
+    """The flow map follows 65 impacts or 66 of a series that ends in rest within one segment."""
+    branch = continue_branch(solve_orbit(impact_oscillator(), 0.035), (0.035, 0.0365))
+    assert len({len(impacts(orbit)) for orbit in branch.points}) > 1
+    assert {tuple(impacts_by_segment(orbit)) for orbit in branch.points} == {(0, 2)}
