@@ -49,11 +49,11 @@ LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # steps from a crossing, over `SHORTEST_C
 FARTHEST_CROSSING = 1e-4  # distance of one from which a step may begin
 GRAZES = 1e-4  # depth over size at which a walk that cannot go on is at a grazing of a rigid stop
 SLIGHTEST = 1e-6  # impact with one that is followed: multipliers go with its inverse
-NEAR_NODE = 1e-4  # phase from an impact to one of shooting from which a walk may pass it
-FARTHEST_NODE = 0.3  # the same for a step that is not short
-FASTEST = 20.0  # change of an impact's phase with the arclength, at most, in rad
-AT_NODE = 1e-7  # the same that is too near
-PAST_NODE = 1e-6, 1e-5, 1e-4, 1e-3  # steps over it
+NEAR_NODE = 1e-4  # rad from an impact to a phase of shooting, from which a short step may pass it
+FARTHEST_NODE = 0.3  # rad, the same for a step of any length
+FASTEST = 20.0  # rad by which an impact's phase changes at most, over the arclength
+AT_NODE = 1e-7  # rad from an impact to a phase of shooting, which are too few
+PAST_NODE = 1e-6, 1e-5, 1e-4, 1e-3  # short steps past it, in arclength
 MOST_BEHIND = 4  # points behind the last one that tell where a branch goes on
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
@@ -124,13 +124,13 @@ def grazing_between(a: Orbit, b: Orbit) -> bool:
 
 
 def _past_impact_at_node(
-    here: BranchNode, shifts: Sequence[float], near: float
+    here: BranchNode, shifts: Sequence[float], near: float, max_angle: float
 ) -> tuple[BranchNode, float, float] | None:
     """Next point where the phase of an impact with a rigid stop passes one of shooting, or None.
 
-    The state there jumps from that before the impact to that behind it, or back. So the orbit is
-    solved for by its states at other phases, a step ahead, the first of `shifts` that leads on. The
-    phase must be as near as told.
+    The state there jumps from that before the impact to that behind it, or back. So the step is
+    made with the states at other phases, the first of `shifts` that leads on by no more than an
+    angle. The phase must be as near as told.
     """
     orbit, problem = here.orbit, here.orbit.problem
     before = impact_behind_node(orbit)
@@ -142,30 +142,47 @@ def _past_impact_at_node(
     by_frequency = np.zeros(orbit.point.size)
     by_frequency[-1] = math.copysign(1.0, here.tangent[-1])
     try:
-        guess = family.unknowns(orbit)
+        begin = family.unknowns(orbit)
+        first = correct(family, begin, Free(), np.abs(by_frequency), float(begin[-1]))
+        if not first.converged:
+            return None
+        weights = family.metric(first.at.point)
+        direction = _unit(first.along, weights, by_frequency)
+        row = weights * direction
+        row /= np.linalg.norm(row)
         for shift in shifts:
-            guess[-1] = chart.coordinate(hz * math.exp(shift * float(here.tangent[-1])))
-            met = correct(family, guess, Free(), np.abs(by_frequency), float(guess[-1]))
-            if not met.converged:
+            straight = first.at.point + shift * direction
+            met = correct(family, straight, Free(), row, float(row @ straight))
+            off = metric_length(weights, met.at.point - straight)
+            if not met.converged or off > FARTHEST_OFF * max_angle * shift:
                 continue
+            way = _unit(met.along, weights, weights * direction)
+            angle = math.acos(min(max(float(direction @ (weights * way)), -1.0), 1.0))
             behind = impact_behind_node(met.orbit)
             stays = (impacts_by_segment(met.orbit) == impacts_by_segment(orbit)).all()
             if abs(behind) < AT_NODE or (stays and abs(before) > AT_NODE and before * behind > 0.0):
                 continue
+            by_frequency[-1] = math.copysign(1.0, way[-1])
             found = problem.correct(
                 met.orbit.point, by_frequency, longest=NEAR_NODE, max_iterations=FROM_NEAR
             )
-            if found.converged:
-                other = Orbit.of(problem, found, orbit.observe)
-                change = other.max_abs_displacement / orbit.max_abs_displacement - 1.0
-                if other.impacts == orbit.impacts and abs(change) < 100.0 * shift + NEAR_NODE:
-                    tangent = problem.tangent(found, by_frequency)
-                    there = BranchNode(other, tangent, here.arclength + shift)
-                    if not differs(here, there):
-                        return there, 0.0, 0.0
+            if angle > max_angle or not found.converged:
+                continue
+            other = Orbit.of(problem, found, orbit.observe)
+            if loses_impact(other) or grazing_between(orbit, other):
+                continue
+            there = BranchNode(other, problem.tangent(found, by_frequency), here.arclength + shift)
+            if other.impacts == orbit.impacts and not differs(here, there):
+                return there, angle, 0.0
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
         pass
     return None
+
+
+def _unit(vector: Real, weights: Real, towards: Real) -> Real:
+    """A vector made as long as 1 in a metric, on the side of a row."""
+    length = metric_length(weights, vector)
+    return np.asarray(vector / (length if float(towards @ vector) >= 0.0 else -length))
 
 
 @dataclass
@@ -290,7 +307,9 @@ class Stepper:
             if attempt is None and step <= KINK:
                 attempt = self._across_touch(problem, here, step)
             elif attempt is None and problem.flow.system.jumps:
-                attempt = _past_impact_at_node(here, (step,), min(FARTHEST_NODE, FASTEST * step))
+                attempt = _past_impact_at_node(
+                    here, (step,), min(FARTHEST_NODE, FASTEST * step), self.options.max_angle
+                )
             if attempt is None and step <= MEETING_STEP and self._met == 2.0 * step:
                 step, self._met = self._met, 0.0  # shorter, it ends too near to the flip
                 attempt = self._advance(problem, behind, here, step, step)
@@ -299,7 +318,7 @@ class Stepper:
             step *= 0.5
             if not tried and self.options.min_step <= step < SHORTEST_CROSSING:
                 tried = True
-                attempt = _past_impact_at_node(here, PAST_NODE, NEAR_NODE)
+                attempt = _past_impact_at_node(here, PAST_NODE, NEAR_NODE, self.options.max_angle)
                 attempt = attempt or self._past_crossing(here)
                 if attempt is not None:
                     return attempt[0].arclength - here.arclength, *attempt

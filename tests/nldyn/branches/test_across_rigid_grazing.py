@@ -7,7 +7,15 @@ import pytest
 from event_driven import PiecewiseLinear
 from one_impact import OneImpact
 
-from nldyn import HarmonicForce, RigidStop, System, continue_branch, impacts, solve_orbit
+from nldyn import (
+    ContinuationOptions,
+    HarmonicForce,
+    RigidStop,
+    System,
+    continue_branch,
+    impacts,
+    solve_orbit,
+)
 from nldyn.branches.endings import Ending
 
 GAP, RESTITUTION = 0.3, 0.8
@@ -118,3 +126,24 @@ def test_a_near_miss_right_behind_an_impact_is_seen():
     assert branch.stop_reasons[0].ending is Ending.RANGE_END
     won = [special.orbit.impacts for special in branch.special_points if special.kind == "GR"]
     assert won == [7, 6, 5, 4, 3, 2, 1, 0]
+
+
+@pytest.mark.parametrize("range_hz", [(0.08, 0.1), (0.12, 0.17)])
+def test_steps_of_any_length_find_the_same_special_points(range_hz):
+    """Impacts pass a phase of shooting at 0.087 and 0.158 Hz, in long steps and in short ones."""
+    matrices, force, *_ = ACROSS["in its place"]
+    system = system_of(matrices, force, [RigidStop("x0", RESTITUTION, GAP)])
+    orbit = solve_orbit(system, 0.5 * sum(range_hz))
+    long, short = (
+        continue_branch(
+            orbit, range_hz, options=ContinuationOptions(first_step=0.005, max_step=step)
+        )
+        for step in (0.2, 0.005)
+    )
+    told, found = (
+        sorted((special.kind, special.frequency_hz) for special in branch.special_points)
+        for branch in (short, long)
+    )
+    assert not long.notes
+    assert [kind for kind, _ in found] == [kind for kind, _ in told]
+    assert [hz for _, hz in found] == pytest.approx([hz for _, hz in told], rel=1e-9)
