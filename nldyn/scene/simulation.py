@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from nldyn.base.errors import SystemModelError
+from nldyn.flow.flow_map import FlowMap, FlowOptions
 from nldyn.longterm.lyapunov import LyapunovSpectrum, lyapunov_exponents
 from nldyn.longterm.simulation import Motion, simulate, sweep
 from nldyn.scene.build import build_system
@@ -21,7 +22,7 @@ class Simulation:
     motion : Motion
         The recorded motion.
     spectrum : LyapunovSpectrum or None
-        Its Lyapunov exponents, if they were wanted.
+        Lyapunov exponents of the motion that its end leads to, if they were wanted.
     """
 
     motion: Motion
@@ -43,7 +44,8 @@ def simulation_of(
     Parameters
     ----------
     scene : Scene
-        It needs no continuation, and its forces may have frequencies of their own.
+        It needs no continuation, whose `rtol` counts if there is one; its forces may have
+        frequencies of their own.
     frequency_hz : float
         Excitation frequency in Hz, at which a run-up or run-down begins.
     periods : int
@@ -51,7 +53,8 @@ def simulation_of(
     transient : int
         Periods before the recording, or before the run-up.
     exponents : bool
-        Whether to compute the Lyapunov exponents at this frequency, too.
+        Whether to compute the Lyapunov exponents at this frequency, too, from the end of the
+        simulated motion on, see `nldyn.longterm.lyapunov_exponents`.
     to_hz : float, optional
         Frequency in Hz at which a run-up or run-down ends, in place of `periods`.
     rate_hz_per_s : float
@@ -71,13 +74,14 @@ def simulation_of(
     >>> simulation_of(load_scene(example("one_dof.toml")), 20.0, periods=200).motion
     <Motion of 10 s>
     """
-    system = build_system(scene)
+    table = scene.continuation
+    flow = FlowMap(build_system(scene), FlowOptions(table.rtol) if table else None)
     with told_as(scene, (), SystemModelError):
         if to_hz is None:
-            motion = simulate(system, frequency_hz, periods, transient=transient)
+            motion = simulate(flow, frequency_hz, periods, transient=transient)
         else:
-            start = simulate(system, frequency_hz, transient).end if transient else None
-            motion = sweep(system, (frequency_hz, to_hz), rate_hz_per_s, start=start)
+            start = simulate(flow, frequency_hz, transient).end if transient else None
+            motion = sweep(flow, (frequency_hz, to_hz), rate_hz_per_s, start=start)
         if not exponents:
             return Simulation(motion)
-        return Simulation(motion, lyapunov_exponents(system, frequency_hz))
+        return Simulation(motion, lyapunov_exponents(flow, frequency_hz, start=motion.end))
