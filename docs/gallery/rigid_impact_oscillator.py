@@ -1,7 +1,7 @@
 """An oscillator against a rigid stop.
 
-Each impact leaves 0.8 of the speed [S. W. Shaw and P. J. Holmes, *J. Sound Vib.* 90 (1983)]. The
-branch ends where the impact becomes a touch: where the linear response reaches just the gap.
+Each impact leaves 0.8 of the speed [S. W. Shaw and P. J. Holmes, *J. Sound Vib.* 90 (1983)]. Where
+the impact becomes a touch, the linear response reaches just the gap: the branch goes on with it.
 """
 
 import matplotlib.pyplot as plt

@@ -14,6 +14,7 @@ import numpy as np
 from nldyn.base.errors import ConvergenceError, SystemModelError
 from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.rigid_touch import Touch
+from nldyn.bifurcations.sign_changes import accounted
 from nldyn.bifurcations.touching import rigid_grazing, rigid_touches
 from nldyn.orbits.bordered import length_unit
 from nldyn.orbits.conditions import Grazing
@@ -22,6 +23,7 @@ from nldyn.orbits.shooting import FROM_NEAR, metric_length
 
 SLIGHT = 1e-5, 1e-4, 1e-3  # first impacts and misses looked for, depth over the orbit's size
 AS_ASKED = 0.1  # relative difference of the depth found from it
+LIMITS = 10.0  # over the largest multiplier: how far others may be from their limits at grazing
 PROPORTIONAL = 0.2  # most by which the way from the grazing is not in proportion to the depth
 
 
@@ -57,6 +59,21 @@ def beyond_rigid_grazing(at: BranchNode, before: Orbit) -> BranchNode | None:
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
         pass
     return None
+
+
+def crosses_beside(at: Orbit, beside: Orbit) -> bool:
+    """Whether a multiplier crosses, or may cross, the unit circle from a grazing to an orbit by it.
+
+    Without the slight impact multipliers change steadily. With it the largest tends to infinity as
+    the inverse of its speed, and the others to limits by as little as the speed; that of a single
+    mode to zero, as the product of both is fixed.
+    """
+    grazed = rigid_grazing(beside)
+    if grazed is None or grazed[2] < 0.0:
+        return not accounted(at, [], beside)
+    *others, largest = np.sort(np.abs(beside.multipliers))
+    near = LIMITS / largest if len(others) > 1 else 0.0
+    return bool(largest <= 1.0 or np.any(np.abs(np.array(others) - 1.0) < near))
 
 
 def _slight_touches(orbit: Orbit) -> int:

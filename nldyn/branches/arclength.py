@@ -241,6 +241,11 @@ class Stepper:
             low, high = self.range_hz
             if not low <= point.orbit.frequency_hz <= high:
                 end = self._range_end(here, point, low if point.orbit.frequency_hz < low else high)
+                half_step = 0.5 * step
+                passed = end is not None and grazing_between(here.orbit, end.orbit)
+                if passed and half_step >= self.options.min_step:  # behind the end may be rest
+                    self.stride = replace(self.stride, step=half_step)
+                    continue
                 self.stop_reason = Ending.RANGE_END.told()
                 if end is not None:
                     yield end
@@ -262,6 +267,7 @@ class Stepper:
             grazes = grazes_rigid(point.orbit, 0.0, SLIGHTEST)
             if grazes:
                 self.stop_reason = grazes
+                yield point
                 return
             if self.closes(here, point):
                 self.stop_reason = Ending.CLOSED_BRANCH.told()

@@ -11,7 +11,7 @@ from operator import attrgetter
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, LocateError
-from nldyn.bifurcations.beyond_rigid_grazing import beyond_rigid_grazing
+from nldyn.bifurcations.beyond_rigid_grazing import beyond_rigid_grazing, crosses_beside
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossing, without_repeats
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
@@ -173,6 +173,12 @@ class LegBuilder:
         beyond = None
         if grazing.orbit is not last.orbit:
             beyond = beyond_rigid_grazing(grazing.point, last.orbit)
+            sides = [last.orbit] if beyond is None else [last.orbit, beyond.orbit]
+            if any(crosses_beside(grazing.orbit, side) for side in sides):
+                self.notes.append(
+                    f"special points near {grazing.frequency_hz:.8g} Hz may be missing: "
+                    "multipliers may cross the unit circle right beside the grazing"
+                )
         if beyond is None:
             walk.stop_reason = Ending.GRAZES_RIGID.told(hz=f"{grazing.frequency_hz:.9g}")
             return False

@@ -147,3 +147,20 @@ def test_steps_of_any_length_find_the_same_special_points(range_hz):
     assert not long.notes
     assert [kind for kind, _ in found] == [kind for kind, _ in told]
     assert [hz for _, hz in found] == pytest.approx([hz for _, hz in told], rel=1e-9)
+
+
+def test_a_flip_right_beside_a_grazing_is_told_or_noted():
+    """The multiplier of six impacts comes from minus infinity: it passes -1, however near.
+
+    All grazings count, also where the last step leads from the range to orbits with rest.
+    """
+    damped = [[1.0]], [[1.0]], [[3.0]]
+    system = system_of(damped, [1.0], [RigidStop("x0", 0.3, GAP)])
+    branch = continue_branch(solve_orbit(system, 0.1345), (0.134083, 0.1346))
+    assert [special.kind for special in branch.special_points] == ["GR", "PD", "GR"]
+    lost = branch.special_points[0].frequency_hz
+    last = min(branch.points, key=lambda orbit: orbit.frequency_hz)
+    assert last.impacts == 6
+    assert -1.0 < last.multipliers.real.min() < 0.0
+    (note,) = branch.notes
+    assert note.startswith(f"special points near {lost:.8g} Hz may be missing")
