@@ -733,7 +733,7 @@ class Trajectory:
                 f"phases must lie within the motion, {first:g} to {last:g}, got "
                 f"{phases[0]:g} to {phases[-1]:g}"
             )
-        return self._evaluate(sample_states, NO_RIDE, phases)
+        return self._evaluate(sample_states, phases)
 
     def _solved_in_contact(self, phases: Real) -> tuple[NDArray[np.intp], Real]:
         """Which of some ascending phases lie in contact panels, and the flow map's states (k, 2n).
@@ -789,7 +789,8 @@ class Trajectory:
         first = flow.first_alike[output]
         if first not in self._extremes:
             ride = flow.ride(first, self.omega)
-            self._extremes[first] = self._evaluate(local_extremes, ride, first)
+            found = self._evaluate(local_extremes, ride.orders, ride.amplitudes, first)
+            self._extremes[first] = found
         return self._extremes[first]
 
     @cached_property
@@ -815,10 +816,7 @@ class Trajectory:
         phases = rec.phase[contact, None] + self.omega * duration * tables.chi[kind]
         return phases.ravel(), (duration * tables.weights[kind]).ravel()
 
-    def _evaluate(self, kernel: Any, ride: Ride, wanted: Any) -> Real:
+    def _evaluate(self, kernel: Any, *arguments: object) -> Real:
         """Call a kernel of `sample` on the recorded pieces."""
         flow = self.flow
-        found = kernel(
-            flow._data, flow.tables, self.record, self.omega, ride.orders, ride.amplitudes, wanted
-        )
-        return np.asarray(found)
+        return np.asarray(kernel(flow._data, flow.tables, self.record, self.omega, *arguments))

@@ -43,15 +43,6 @@ class Terms(NamedTuple):
     orders: Real
     rates: Complex
 
-    def with_steady(self, orders: Real) -> Terms:
-        """The same with steady terms of further orders at the end."""
-        more = orders.size
-        return Terms(
-            np.append(self.kinds, np.full(more, STEADY, dtype=np.int64)),
-            np.append(self.orders, orders),
-            np.append(self.rates, np.zeros(more, dtype=complex)),
-        )
-
 
 _Term = tuple[int, float, complex, Complex]  # kind, order, rate and amplitude
 

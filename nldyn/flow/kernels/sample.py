@@ -123,19 +123,15 @@ def without_steady(terms, response, phase, state, w):
 
 
 @allocating
-def responses(system, omega, orders, amplitudes, out):
-    """What excitation brings about at a frequency: terms, of the state and of an output.
-
-    The output also rides on a base that moves by Σ Re(amplitudes e^{i orders ωt}).
+def responses(system, omega, orders):
+    """What excitation brings about at a frequency, with steady terms of further orders at the end.
 
     Returns
     -------
     terms : Terms
-        k of them, those of the base last.
+        k of them.
     response : (1 + k, 2n)
-        Amplitudes of the state, as of a `ForcedResponse`.
-    forced : (1 + k,)
-        Those of the output.
+        Amplitudes of the state, as of a `ForcedResponse`; those at the end are zero.
     """
     found = at_frequency(
         system, omega, np.zeros((0, 2), dtype=np.int64), np.zeros((0, 1, 3, 1), dtype=np.complex128)
@@ -144,24 +140,22 @@ def responses(system, omega, orders, amplitudes, out):
     count = k + orders.size
     terms = Terms(np.full(count, STEADY), np.zeros(count), np.zeros(count, dtype=np.complex128))
     response = np.zeros((1 + count, size), dtype=np.complex128)
-    forced = np.zeros(1 + count, dtype=np.complex128)
     for p in range(1 + k):
         for i in range(size):
             response[p, i] = found.response[p, 0, i]
-        forced[p] = found.forced[p, 0, out]
     for p in range(k):
         terms.kinds[p] = found.terms.kinds[p]
         terms.orders[p], terms.rates[p] = found.terms.orders[p], found.terms.rates[p]
     for p in range(k, count):
-        terms.orders[p], forced[1 + p] = orders[p - k], amplitudes[p - k]
-    return terms, response, forced
+        terms.orders[p] = orders[p - k]
+    return terms, response
 
 
 @compiled
-def sample_states(system, tab, rec, omega, orders, amplitudes, phases):
+def sample_states(system, tab, rec, omega, phases):
     """States (n_phases, 2n) at ascending forcing phases; for the arguments see `local_extremes`."""
     blocks, force = system.blocks, system.force
-    terms, response, _ = responses(system, omega, orders, amplitudes, 0)
+    terms, response = responses(system, omega, np.empty(0))
     states = np.empty((phases.size, force.shape[0]))
     shares = np.empty((tab.nodes.size, force.shape[0]))
     start = np.empty(force.shape[0])
@@ -241,13 +235,19 @@ def local_extremes(system, tab, rec, omega, orders, amplitudes, out):
     omega : float
         Excitation frequency.
     orders, amplitudes : (k,)
-        Of a base on which the output rides, see `responses`.
+        Of a base on which the output rides: it adds Σ Re(amplitudes e^{i orders ωt}).
     out : int
         The output.
     """
     blocks, force = system.blocks, system.force
     row, row1 = system.rows[0, out], system.rows[1, out]
-    terms, response, forced = responses(system, omega, orders, amplitudes, out)
+    terms, response = responses(system, omega, orders)
+    forced = np.zeros(response.shape[0], dtype=np.complex128)
+    for p in range(forced.size):
+        for i in range(row.size):
+            forced[p] += row[i] * response[p, i]
+    for p in range(orders.size):
+        forced[forced.size - orders.size + p] = amplitudes[p]
     found = np.empty((64, 3))
     n = 0
     w, v, start = np.empty(force.shape[0]), np.empty(force.shape[0]), np.empty(force.shape[0])
