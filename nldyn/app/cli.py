@@ -597,8 +597,9 @@ def simulate(
                 loaded, frequency_hz, periods=periods or 100, transient=transient,
                 exponents=exponents, to_hz=to_hz, rate_hz_per_s=rate_hz_per_s or 0.0,
             )  # fmt: skip
-        write_simulation(found.motion, out, loaded.text, loaded.title)
-    for told in (found.motion, impacts(found.motion), found.spectrum):
+        hits = impacts(found.motion)
+        write_simulation(found.motion, hits, out, loaded.text, loaded.title)
+    for told in (found.motion, hits, found.spectrum):
         if told is not None:
             click.echo(repr(told).strip("<>"))
     click.echo(f"written to {out}: {written_by(out, 'simulation')}")

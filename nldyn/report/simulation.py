@@ -7,8 +7,9 @@ from pathlib import Path
 from matplotlib.axes import Axes
 
 from nldyn.io.history_files import write_history
-from nldyn.longterm.impacts import impacts
+from nldyn.longterm.impacts import Impacts
 from nldyn.longterm.simulation import Motion
+from nldyn.orbits.history import History
 from nldyn.orbits.orbit import check_observe
 from nldyn.plot.diagram import PERIOD_COLOURS, length_unit, new_axes, save_figure
 from nldyn.plot.longterm import plot_sweep
@@ -18,7 +19,9 @@ from nldyn.runtime.result_directory import result_directory
 PER_PERIOD = 64  # rows of the table in an excitation period
 
 
-def write_simulation(motion: Motion, directory: str | Path, text: str, title: str = "") -> Path:
+def write_simulation(
+    motion: Motion, hits: Impacts, directory: str | Path, text: str, title: str = ""
+) -> Path:
     """Write ``motion.csv``, ``impacts.csv``, ``simulation.png`` and ``.svg``, and the scene.
 
     Of a run-up also ``peaks.csv``, the largest displacement in each excitation period.
@@ -30,25 +33,24 @@ def write_simulation(motion: Motion, directory: str | Path, text: str, title: st
     """
     observed = check_observe(motion.system, None)
     hz, peaks = motion.period_peaks(observed)
+    history = motion.history(PER_PERIOD * max(hz.size, 1))
     with result_directory(directory, "simulation") as folder:
-        write_history(motion.history(PER_PERIOD * max(hz.size, 1)), folder / "motion.csv")
-        hits = impacts(motion).columns()
-        rows = zip(*(column.tolist() for column in hits.values()), strict=True)
-        write_table(folder / "impacts.csv", hits, rows)
+        write_history(history, folder / "motion.csv")
+        columns = hits.columns()
+        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+        write_table(folder / "impacts.csv", columns, rows)
         if motion.rate_hz_per_s:
             rows = zip(hz.tolist(), peaks.tolist(), strict=True)
             write_table(folder / "peaks.csv", ("frequency_hz", "max_abs_displacement_m"), rows)
-        ax = plot_sweep(motion) if motion.rate_hz_per_s else plot_motion(motion, observed)
+        ax = plot_sweep(motion) if motion.rate_hz_per_s else plot_motion(history, observed)
         ax.set_title(title or "Simulation")
         save_figure(ax, folder / "simulation")
         (folder / "scene.toml").write_text(text, encoding="utf-8")
     return Path(directory)
 
 
-def plot_motion(motion: Motion, interface: str) -> Axes:
+def plot_motion(history: History, interface: str) -> Axes:
     """Draw the displacement of an interface over the time."""
-    periods = max(motion.period_peaks(interface)[0].size, 1)
-    history = motion.history(PER_PERIOD * periods)
     values = history.displacement[interface]
     factor, unit = length_unit(float(abs(values).max()))
     ax = new_axes()

@@ -83,7 +83,10 @@ def test_lyapunov_exponent_and_run_up(tmp_path):
         (("--to-hz", "2.0"), "'--to-hz' and '--rate-hz-per-s' go together"),
         (("--rate-hz-per-s", "2.0"), "'--to-hz' and '--rate-hz-per-s' go together"),
         (("--to-hz", "2.0", "--rate-hz-per-s", "1.0", "--periods", "9"), "are for one frequency"),
-        (("--to-hz", "1.0", "--rate-hz-per-s", "1.0"), "scene.toml: "),
+        (
+            ("--to-hz", "1.0", "--rate-hz-per-s", "1.0"),
+            "scene.toml: range_hz: the sweep begins and ends",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_told(tmp_path, more, fault):
