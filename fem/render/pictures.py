@@ -748,14 +748,22 @@ def surroundings(
     drawing: Surface, factor: float, stop: StopSphere | None
 ) -> tuple[list[tuple[Any, bool]], list[Any], list[Mass]]:
     """Marks of the supports, bodies of the stop, and the masses."""
-    if isinstance(drawing, SeveralSurfaces):
-        found: tuple[list[tuple[Any, bool]], list[Any], list[Mass]] = [], [], []
-        for name, part in drawing.parts.items():
-            marks, bodies, masses = surroundings(part, factor, stop_at(name, stop))
-            found[0].extend(marks)
-            found[1].extend(bodies)
-            found[2].extend(OfPart(name, mass) for mass in masses if not isinstance(mass, OfPart))
-        return found
+    if not isinstance(drawing, SeveralSurfaces):
+        marks, bodies, masses = part_surroundings(drawing, factor, stop)
+        return marks, bodies, [*masses]
+    found: tuple[list[tuple[Any, bool]], list[Any], list[Mass]] = [], [], []
+    for name, part in drawing.parts.items():
+        marks, bodies, masses = part_surroundings(part, factor, stop_at(name, stop))
+        found[0].extend(marks)
+        found[1].extend(bodies)
+        found[2].extend(OfPart(name, mass) for mass in masses)
+    return found
+
+
+def part_surroundings(
+    drawing: FrameSurface | StructureSurface, factor: float, stop: StopSphere | None
+) -> tuple[list[tuple[Any, bool]], list[Any], list[Block | Cube]]:
+    """The same of one component."""
     if isinstance(drawing, StructureSurface):
         stops = [] if stop is None else stop_bodies(drawing, stop, factor)
         return list(support_marks(drawing)), stops, [*mass_cubes(drawing, stop)]

@@ -124,12 +124,12 @@ def grazing_between(a: Orbit, b: Orbit) -> bool:
 
 
 def _past_impact_at_node(
-    here: BranchNode, shifts: Sequence[float], near: float, max_angle: float
+    here: BranchNode, steps: Sequence[float], near: float, max_angle: float
 ) -> tuple[BranchNode, float, float] | None:
     """Next point where the phase of an impact with a rigid stop passes one of shooting, or None.
 
     The state there jumps from that before the impact to that behind it, or back. So the step is
-    made with the states at other phases, the first of `shifts` that leads on by no more than an
+    made with the states at other phases, the first of `steps` that leads on by no more than an
     angle. The phase must be as near as told.
     """
     orbit, problem = here.orbit, here.orbit.problem
@@ -150,11 +150,11 @@ def _past_impact_at_node(
         direction = _unit(first.along, weights, by_frequency)
         row = weights * direction
         row /= np.linalg.norm(row)
-        for shift in shifts:
-            straight = first.at.point + shift * direction
+        for step in steps:
+            straight = first.at.point + step * direction
             met = correct(family, straight, Free(), row, float(row @ straight))
             off = metric_length(weights, met.at.point - straight)
-            if not met.converged or off > FARTHEST_OFF * max_angle * shift:
+            if not met.converged or off > FARTHEST_OFF * max_angle * step:
                 continue
             way = _unit(met.along, weights, weights * direction)
             angle = math.acos(min(max(float(direction @ (weights * way)), -1.0), 1.0))
@@ -171,7 +171,7 @@ def _past_impact_at_node(
             other = Orbit.of(problem, found, orbit.observe)
             if loses_impact(other) or grazing_between(orbit, other):
                 continue
-            there = BranchNode(other, problem.tangent(found, by_frequency), here.arclength + shift)
+            there = BranchNode(other, problem.tangent(found, by_frequency), here.arclength + step)
             if other.impacts == orbit.impacts and not differs(here, there):
                 return there, angle, 0.0
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
