@@ -24,12 +24,12 @@ PLAIN = (bool, int, float, complex, str, bytes, np.generic, PurePath, range, sli
 def case_fingerprints(
     cases: list[dict[str, Any]], folder: Path, measure: Callable[..., Any], name: str | None
 ) -> list[str]:
-    """A key for each case, of its tables, the bytes of the files it names and the measure.
+    """A fingerprint of each case, of its tables, the bytes of the files it names and the measure.
 
     Raises
     ------
     SystemModelError
-        If the measure depends on an object that has no key and no name is given.
+        If the measure depends on an object that has none and no name is given.
     """
     identity = (
         ["named", name] if name is not None else ["measure", MeasureFingerprint(measure).of_measure]
@@ -100,7 +100,7 @@ class MeasureFingerprint:
 
     @property
     def of_measure(self) -> Any:
-        """The key of the whole."""
+        """That of the whole."""
         self.seen.clear()
         inner = _innermost(self.measure)
         if not isinstance(inner, FunctionType | BuiltinFunctionType):
@@ -108,7 +108,7 @@ class MeasureFingerprint:
         return self._of("it", self.measure)
 
     def _of(self, name: str, value: object) -> Any:
-        """Key of a value; one that is met within itself counts by its kind."""
+        """That of a value; one that is met within itself counts by its kind."""
         if value is None or value is ... or isinstance(value, PLAIN):
             return [type(value).__name__, repr(value)]
         if isinstance(value, ModuleType):

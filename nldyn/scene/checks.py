@@ -281,6 +281,10 @@ def _check_components(scene: Scene, file: Path) -> None:
             raise report((), "gives no structure; it needs a [mesh] or [matrices] of its own")
         _check_structure(part, report)
         _check_matrices(part, report)
+        if part.mesh is not None and part.mesh.mirror is not None:
+            raise report(
+                ("mesh", "mirror"), "is for a single component; several are drawn as they are"
+            )
         if part.reduction is not None and part.reduction.tolerance is not None:
             fault = "is for a single component; give 'modes' or 'cutoff_hz'"
             raise report(("reduction", "tolerance"), fault)

@@ -68,7 +68,7 @@ class MeshTable(Table):
     solids, shells and beams in space or in the plane, see [structures.md](structures.md)."""
     mirror: str | None = None
     """Of a frame: point on the plane of symmetry of a half model. `nldyn render` then draws the
-    whole structure; nothing else changes."""
+    whole structure; nothing else changes. Not in a component of several."""
     parts_from_file: list[str] = []
     """Names of parts whose material and section are taken from an Abaqus or CalculiX file, see
     [decks.md](decks.md); they are not in `[parts]`."""

@@ -100,6 +100,14 @@ def test_two_meshes_with_all_modes_are_the_mesh_of_the_whole(tmp_path):
     assert static == pytest.approx((2 * L) ** 3 / (3 * E * B * H**3 / 12), rel=1e-9)
 
 
+def test_a_mirror_of_one_of_several_components_is_refused(tmp_path):
+    scene = halves(tmp_path, JOINTS + FORCE)
+    text = scene.text.replace('file = "outer.vtu"', 'file = "outer.vtu"\nmirror = "right"')
+    (tmp_path / "mirrored.toml").write_text(text)
+    with pytest.raises(SceneError, match=r"outer\.mesh\.mirror is for a single component"):
+        load_scene(tmp_path / "mirrored.toml")
+
+
 def test_weight_and_base_act_on_every_component(tmp_path):
     """The tip sags by rho A g (2 L)^4 / 8 E I whatever the modes; r^T M r is the mass."""
     loads = '[[excitation]]\nkind = "weight"\nacceleration = [0.0, -9.81]\n'
