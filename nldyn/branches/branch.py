@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_choice, check_types, shown
+from nldyn.base.html_tables import html_table
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.at_frequency import Places, crossings, passes
 from nldyn.branches.endings import Ending, StopReasons, has_ending
@@ -143,6 +144,12 @@ class Branch:
             f"<Branch '{self.name}': period {self.period}, {len(hz)} points from {min(hz):.6g} to "
             f"{max(hz):.6g} Hz, {len(self.special_points)} special points; {self.stop_reason}>"
         )
+
+    def _repr_html_(self) -> str:
+        """The special points, a row each."""
+        rows = [(s.kind, f"{s.frequency_hz:.9g}", f"{s.frequency_error:.1g}")
+                for s in self.special_points]  # fmt: skip
+        return html_table(repr(self), ("kind", "frequency (Hz)", "relative error"), rows)
 
     @property
     def points(self) -> list[Orbit]:

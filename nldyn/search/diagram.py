@@ -21,6 +21,7 @@ from nldyn.base.errors import (
     check_types,
     check_whole,
 )
+from nldyn.base.html_tables import html_table
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.branches.checkpoint import BranchFile, checkpoint_of_several
 from nldyn.branches.step_control import ContinuationOptions
@@ -116,6 +117,19 @@ class Diagram:
             f"<Diagram of {low:g} to {high:g} Hz at '{self.observe}': {counted(self.branches)} of "
             f"period {periods or '(none)'}, {special} special points>"
         )
+
+    def _repr_html_(self) -> str:
+        """The branches, a row each."""
+        rows = []
+        for branch in self.branches:
+            hz = branch.frequency_hz
+            range_hz = f"{hz.min():.6g} to {hz.max():.6g}"
+            special = len(branch.special_points)
+            rows.append(
+                (branch.name, branch.period, range_hz, len(hz), special, branch.stop_reason)
+            )
+        head = ("branch", "period", "range (Hz)", "points", "special points", "ends")
+        return html_table(repr(self), head, rows)
 
     def of_period(self, period: int) -> list[Branch]:
         """Branches of one period multiple."""

@@ -1,11 +1,13 @@
 """Branches as tables."""
 
 import importlib
+from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from nldyn import SystemModelError
+from nldyn import Diagram, SystemModelError
 from nldyn.branches.tables import UNITS
 from nldyn.report.results import BRANCH_COLUMNS
 
@@ -61,3 +63,20 @@ def test_a_missing_package_is_named(harmonic_branch, monkeypatch, package, metho
     monkeypatch.setitem(importlib.import_module("sys").modules, package, None)
     with pytest.raises(SystemModelError, match=f"{method} needs {package}"):
         getattr(harmonic_branch, method)()
+
+
+def cells(html: str) -> list[list[str]]:
+    """Texts of the rows of a table below its head."""
+    _, _, *rows = ElementTree.fromstring(html)
+    return [["".join(cell.itertext()) for cell in row] for row in rows]
+
+
+def test_a_notebook_shows_branches_and_diagrams_as_tables(harmonic_branch):
+    shown = cells(harmonic_branch._repr_html_())
+    assert [row[0] for row in shown] == [s.kind for s in harmonic_branch.special_points]
+    told = [s.frequency_hz for s in harmonic_branch.special_points]
+    assert [float(row[1]) for row in shown] == pytest.approx(told, rel=1e-8)
+    named = replace(harmonic_branch, name="<a & b>")
+    (row,) = cells(Diagram((named,), (5.7, 90.0), "middle", ())._repr_html_())
+    special, points = len(named.special_points), len(named.points)
+    assert row == ["<a & b>", "1", "5.7 to 90", str(points), str(special), named.stop_reason]
