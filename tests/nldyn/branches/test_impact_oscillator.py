@@ -160,13 +160,26 @@ def test_lyapunov_exponents_see_impacts():
     assert found.sum_error < 1e-8
 
 
-@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
-def test_any_start_gives_one_set_of_special_points(branch, every):
-    """From orbits all along the branch, also right beside the impact at a phase of shooting."""
+def same_from_any_start(branch, range_hz, every):
     told = sorted((special.kind, special.frequency_hz) for special in branch.special_points)
     for start in branch.points[:: max(len(branch.points) // 10, 1)][1:10:every]:
-        again = continue_branch(start, (0.13, 0.4))
+        again = continue_branch(start, range_hz)
         found = sorted((special.kind, special.frequency_hz) for special in again.special_points)
         assert [kind for kind, _ in found] == [kind for kind, _ in told]
         assert [hz for _, hz in found] == pytest.approx([hz for _, hz in told], rel=1e-10)
         assert not again.notes
+
+
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
+def test_any_start_gives_one_set_of_special_points(branch, every):
+    """From orbits all along the branch, also right beside the impact at a phase of shooting."""
+    same_from_any_start(branch, (0.13, 0.4), every)
+
+
+@pytest.mark.slow
+def test_any_start_gives_one_set_over_a_chain_of_grazings(branch):
+    """Down to where impacts become ever more, at rest in the end: 0.063 Hz."""
+    range_hz = 0.05, 0.8
+    long = continue_branch(solve_orbit(oscillator(), 1.7 / (2.0 * np.pi)), range_hz)
+    assert len(long.special_points) > len(branch.special_points)
+    same_from_any_start(long, range_hz, 3)
