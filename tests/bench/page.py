@@ -33,6 +33,10 @@ NOTES = {
         "periods after rest: the time of a period with monodromy matrix and derivative by "
         "frequency over its number of impacts, flights included."
     ),
+    "Sample of the atlas": (
+        "Some starts of each family of each model, with all branches that they lead to, and the "
+        "time for all orbits of the atlas if each takes as long."
+    ),
     "Searches in vain": "`solve_orbit` on the same tube, whose motion does not settle.",
     "Branches": (
         "Whole harmonic branches with all special points, warm. `error` is the largest relative "

@@ -9,10 +9,11 @@ from bench import run
 from bench.figures import draw_model
 from bench.measure import Sample
 from bench.models import load_case
-from bench.page import write_page
+from bench.page import NOTES, write_page
 from bench.run import auto_flip_points, auto_times, sample_row, special_point_rows
 from bench.studies import (
     BRANCHES,
+    AtlasTime,
     BranchTime,
     FirstCall,
     GrazingError,
@@ -24,6 +25,7 @@ from bench.studies import (
 )
 from bench.targets import (
     all_targets,
+    atlas_target,
     fastest_rows,
     impact_target,
     ratio_rows,
@@ -100,6 +102,12 @@ def test_verdicts_follow_from_the_numbers(verdicts):
     assert of("first orbit", "warm") == "met"
 
 
+def test_the_atlas_takes_as_long_as_its_orbits():
+    charts = [AtlasTime("a", 6.0, 100, 12000), AtlasTime("b", 1.0, 10, 6000)]
+    found = atlas_target(charts)
+    assert (found.measured, found.verdict) == ("22 min", "missed")
+
+
 def test_fastest_engine_is_the_one_that_takes_least():
     (row,) = fastest_rows(made_up_samples(), ["one_dof"], [1e-8, 1e-14])
     assert row == {"model": "one_dof", "at 1e-08": "nldyn", "at 1e-14": "none"}
@@ -146,6 +154,13 @@ def test_folder_that_holds_something_else_is_refused_before_measuring(tmp_path, 
         run.run(tmp_path)
 
 
+def test_a_whole_run_writes_all_its_tables(tmp_path, monkeypatch):
+    stub_measurements(monkeypatch)
+    monkeypatch.setattr(run, "draw_model", lambda *_: None)
+    text = run.run(tmp_path / "bench", ["one_dof"], first_call=False).read_text("utf-8")
+    assert all(f"## {title}\n" in text for title in NOTES)
+
+
 @pytest.mark.slow
 def test_results_of_a_benchmark_that_stops_are_not_left_half_written(tmp_path, monkeypatch):
     stub_measurements(monkeypatch)
@@ -178,6 +193,7 @@ def stub_measurements(monkeypatch):
         studies, "time_branch", lambda task: BranchTime(task, 0.2, 10, 2, 0, 1e-10, (("PD", 33.0),))
     )
     monkeypatch.setattr(studies, "impact_times", lambda: IMPACTS)
+    monkeypatch.setattr(studies, "atlas_times", lambda: [AtlasTime("one_dof", 2.0, 100, 6000)])
     monkeypatch.setattr(studies, "vain_searches", lambda: SEARCHES)
     monkeypatch.setattr(run.throughput, "resonance_rates", lambda: {20.0: 3000.0})
     monkeypatch.setattr(studies, "profile_branch", lambda task: {"flow map": 0.6, "walk": 0.4})
