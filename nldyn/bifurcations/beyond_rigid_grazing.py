@@ -1,8 +1,9 @@
-"""How a branch goes on behind a grazing of a rigid stop.
+"""How a branch goes on behind a grazing of rigid stops.
 
 Two families meet there, one with the slight impact and one without; each begins in proportion to
 the speed of the impact, or to the miss (Nordmark 1991; di Bernardo, Budd, Champneys and Kowalczyk
-2008, *Piecewise-smooth Dynamical Systems*, ch. 6).
+2008, *Piecewise-smooth Dynamical Systems*, ch. 6). Where several touches graze at once, there may
+be one with each mixture of impacts and misses.
 """
 
 from __future__ import annotations
@@ -11,27 +12,30 @@ from dataclasses import replace
 
 import numpy as np
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError
+from nldyn.bifurcations.normal_form_coefficients import CoefficientError
 from nldyn.bifurcations.point import BranchNode
-from nldyn.bifurcations.rigid_touch import Touch
+from nldyn.bifurcations.rigid_grazing import Beside, RootMap
+from nldyn.bifurcations.rigid_touch import Touches
 from nldyn.bifurcations.sign_changes import accounted
-from nldyn.bifurcations.touching import rigid_grazing, rigid_touches
+from nldyn.bifurcations.touching import rigid_touches
 from nldyn.orbits.bordered import length_unit
-from nldyn.orbits.conditions import Grazing
-from nldyn.orbits.orbit import Orbit
-from nldyn.orbits.shooting import FROM_NEAR, metric_length
+from nldyn.orbits.orbit import Orbit, minimal_period
+from nldyn.orbits.shooting import FROM_NEAR, asymmetry, metric_length
 
 SLIGHT = 1e-5, 1e-4, 1e-3  # first impacts and misses looked for, depth over the orbit's size
 AS_ASKED = 0.1  # relative difference of the depth found from it
 LIMITS = 10.0  # over the largest multiplier: how far others may be from their limits at grazing
+SYMMETRIC = 1e-8  # relative asymmetry of an orbit that is rounding
 PROPORTIONAL = 0.2  # most by which the way from the grazing is not in proportion to the depth
 
 
 def beyond_rigid_grazing(at: BranchNode, before: Orbit) -> BranchNode | None:
     """First point of a branch behind a grazing.
 
-    If the orbits before have the slight impact, those behind are without it, and the other way
-    round. They are of the branch if they come from the grazing in proportion to impact or miss.
+    Of the orbits that begin there it is the one with the symmetry of those before, but with other
+    impacts. It comes from the grazing in proportion to impacts and misses.
 
     Parameters
     ----------
@@ -43,22 +47,53 @@ def beyond_rigid_grazing(at: BranchNode, before: Orbit) -> BranchNode | None:
     Returns
     -------
     BranchNode or None
-        Heading away from the grazing; None if there is no such orbit, or more than one touch.
+        Heading away from the grazing; None if there is no such orbit, or more than one.
     """
-    exact, grazed = at.orbit, rigid_grazing(before)
-    if grazed is None or _slight_touches(exact) != 1:
-        return None
+    exact = at.orbit
     try:
-        touch = Touch.of(exact, Grazing.of(exact))
-        for share in SLIGHT:
-            found = _beside(exact, touch, share, impact=grazed[2] < 0.0)
-            if found is not None:
-                weights = exact.problem.metric(exact.point)
-                way = metric_length(weights, found.orbit.point - exact.point)
-                return replace(found, arclength=at.arclength + way)
-    except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
-        pass
-    return None
+        touches = Touches.of(exact)
+        ahead = _ahead(touches, exact, before)
+        if ahead is None or _slight_touches(exact) != len(touches.stops):
+            return None
+        found = first_beside(exact, touches, ahead)
+    except (CoefficientError, ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+        return None
+    if found is None:
+        return None
+    weights = exact.problem.metric(exact.point)
+    way = metric_length(weights, found.orbit.point - exact.point)
+    return replace(found, arclength=at.arclength + way)
+
+
+def first_beside(exact: Orbit, touches: Touches, beside: Beside) -> BranchNode | None:
+    """The orbit of a kind nearest to a grazing that is found, heading away from it."""
+    found = (_beside(exact, touches, beside, share) for share in SLIGHT)
+    return next((node for node in found if node is not None), None)
+
+
+def _ahead(touches: Touches, exact: Orbit, before: Orbit) -> Beside | None:
+    """The orbits with which a branch goes on, None if there are several kinds or none."""
+    come = tuple((_depths(touches, before) > 0.0).tolist())
+    if len(come) == 1:  # with the impact or without it, on either side
+        return Beside((not come[0],), 0, (1.0,))
+    form, m = RootMap.of(touches), len(come)
+    shifts = range(0, m, m * minimal_period(exact) // exact.period)
+    mirrored = exact.system.symmetric and asymmetry(exact.problem, exact.point) < SYMMETRIC
+    turns = [*shifts, *((shift + m // 2) % m for shift in shifts if mirrored)]
+
+    def kept(hits: tuple[bool, ...]) -> list[bool]:
+        return [turned(hits, turn) == hits for turn in turns]
+
+    same = [turned(come, shift) for shift in shifts]
+    others = [each for each in form.beside if kept(each.hits) == kept(come)]
+    others = [each for each in others if each.hits not in same]
+    kinds = {min(turned(each.hits, shift) for shift in shifts) for each in others}
+    return others[0] if len(kinds) == 1 else None
+
+
+def turned(hits: tuple[bool, ...], by: int) -> tuple[bool, ...]:
+    """Touches in the order of time, beginning with another one."""
+    return hits[by:] + hits[:by]
 
 
 def crosses_beside(at: Orbit, beside: Orbit) -> bool:
@@ -68,12 +103,28 @@ def crosses_beside(at: Orbit, beside: Orbit) -> bool:
     the inverse of its speed, and the others to limits by as little as the speed; that of a single
     mode to zero, as the product of both is fixed.
     """
-    grazed = rigid_grazing(beside)
-    if grazed is None or grazed[2] < 0.0:
+    slight = SLIGHT[-1] * length_unit(beside)
+    if not any(0.0 < depth < slight for *_, depth in rigid_touches(beside)):
         return not accounted(at, [], beside)
     *others, largest = np.sort(np.abs(beside.multipliers))
     near = LIMITS / largest if len(others) > 1 else 0.0
     return bool(largest <= 1.0 or np.any(np.abs(np.array(others) - 1.0) < near))
+
+
+def _depths(touches: Touches, orbit: Orbit) -> Real:
+    """Depths (m,) of the touches of a grazing on a neighbouring orbit: of impacts, or misses."""
+    full, found = 2.0 * np.pi * orbit.period, rigid_touches(orbit)
+
+    def depth(stop: int, phase: float) -> float:
+        apart = {
+            abs((other - phase + 0.5 * full) % full - 0.5 * full): value
+            for of, other, value in found
+            if of == stop
+        }
+        return apart[min(apart)]
+
+    phases = touches.phases.tolist()
+    return np.array([depth(*each) for each in zip(touches.stops, phases, strict=True)])
 
 
 def _slight_touches(orbit: Orbit) -> int:
@@ -82,19 +133,24 @@ def _slight_touches(orbit: Orbit) -> int:
     return sum(abs(depth) < least for _, _, depth in rigid_touches(orbit))
 
 
-def _beside(exact: Orbit, touch: Touch, share: float, impact: bool) -> BranchNode | None:
-    """The orbit whose impact or miss is a share of the grazing's size, heading away from it."""
-    depth = share * length_unit(exact)
+def _beside(exact: Orbit, touches: Touches, beside: Beside, share: float) -> BranchNode | None:
+    """The orbit whose least impact or miss is a share of the grazing's size, heading away."""
+    hit, depth = np.array(beside.hits), share * length_unit(exact)
+    unit = np.where(hit, touches.omega, 1.0)
+    sizes = beside.amounts / unit
+    lead = int(np.argmin(np.where(hit, sizes, np.inf) if hit.any() else sizes))
+    shape = np.array(beside.amounts) * unit[lead] / beside.amounts[lead]
     places = []
     for size in (0.5 * depth, depth):
-        speed, clearance = (size * touch.omega, 0.0) if impact else (0.0, size)
-        places.append(touch.moved(speed, clearance).unknowns(speed))
-    problem = exact.problem
-    weights = problem.metric(exact.point)
-    near, far = (place - exact.point for place in places)
+        moved, amounts = touches.moved(beside.hits, size * shape, lead)
+        places.append(moved.unknowns(np.where(hit, amounts, 0.0)))
+    problem, times = touches.problem, touches.problem.period // exact.period
+    grazing = np.append(np.tile(exact.point[:-1], times), exact.point[-1])
+    weights = problem.metric(grazing)
+    near, far = (place - grazing for place in places)
     if metric_length(weights, far - 2.0 * near) > PROPORTIONAL * metric_length(weights, far):
         return None
-    by_frequency = np.zeros(exact.point.size)
+    by_frequency = np.zeros(grazing.size)
     by_frequency[-1] = 1.0
     found = problem.correct(
         places[1], by_frequency, longest=AS_ASKED * metric_length(weights, far),
@@ -103,7 +159,8 @@ def _beside(exact: Orbit, touch: Touch, share: float, impact: bool) -> BranchNod
     if not found.converged:
         return None
     orbit = Orbit.of(problem, found, exact.observe)
-    grazed = rigid_grazing(orbit)
-    if grazed is None or abs(grazed[2] - (depth if impact else -depth)) > AS_ASKED * depth:
+    found_depths = _depths(touches, orbit)
+    as_asked = abs(abs(found_depths[lead]) - depth) < AS_ASKED * depth
+    if not as_asked or ((found_depths > 0.0) != hit).any():
         return None
     return BranchNode(orbit, problem.tangent(found, far), 0.0)

@@ -33,7 +33,8 @@ from nldyn.bifurcations.normal_form_coefficients import (
     torus,
 )
 from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special
-from nldyn.bifurcations.rigid_grazing import rigid_grazing_form
+from nldyn.bifurcations.rigid_grazing import RigidGrazing, RootMap
+from nldyn.bifurcations.rigid_touch import Touches
 from nldyn.orbits.conditions import AT_NODE, Grazing
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import asymmetry, metric_length
@@ -44,6 +45,8 @@ NEAR_RESONANCE_DEG = 5.0
 GRAZING_ERROR = 1e-6  # relative, of the numbers of a rigid grazing
 UNCHANGED = 1e-3  # relative change of a null vector that is none
 SIDES = {1: "above", -1: "below"}
+UNSTABLE_WITHOUT = "Without impacts the orbit is unstable"
+JUMPS = "no attractor with slight impacts is to be expected, the motion jumps"
 LOST = "the coefficient is lost in its error"
 NUMBERS = {1: "one", 2: "two", 3: "three"}
 SHARES = (1.0, 0.25, 0.05, 0.01, 1e-3, 1e-4)  # of the amplitude, that a branch may need to begin
@@ -60,8 +63,9 @@ class NormalForm:
     name : str
         ``fold``, ``supercritical flip``, ``subcritical flip``, ``supercritical torus``,
         ``subcritical torus``, ``supercritical pitchfork``, ``subcritical pitchfork``,
-        ``transcritical``, ``new contact``, ``split contact`` or ``rigid grazing``; ``flip``,
-        ``torus``, ``pitchfork`` or ``branch point`` where the coefficient does not tell more.
+        ``transcritical``, ``new contact``, ``split contact``, ``rigid grazing`` or ``multiple rigid
+        grazing``; ``flip``, ``torus``, ``pitchfork`` or ``branch point`` where the coefficient does
+        not tell more.
     sentence : str
         The same in plain words.
     coefficient : Estimate, optional
@@ -486,35 +490,86 @@ def _rigid_grazing(special: SpecialPoint, grazing: Grazing) -> NormalForm:
     *Proc. R. Soc. A* 453, 1261-1276.
     """
     orbit, hz = special.orbit, _hz(special)
-    stop = _stop_name(orbit, grazing.stop, grazing.phase)
-    touched = f"Grazing at {hz}: rigid {stop} is just touched"
+    alone = _stop_name(orbit, grazing.stop, grazing.phase)
     try:
-        form = rigid_grazing_form(orbit, grazing)
+        touches = Touches.of(orbit)
+        root_map = RootMap.of(touches)
+        if len(touches.stops) > 1:
+            return _several_grazings(special, touches, root_map)
+        form = RigidGrazing.of(root_map)
     except (CoefficientError, ConvergenceError, SystemModelError, np.linalg.LinAlgError) as error:
-        return NormalForm("rigid grazing", f"{touched}: no coefficient can be given, {error}.")
+        return NormalForm(
+            "rigid grazing", f"Grazing at {hz}: rigid {alone} is just touched: no coefficient can "
+            f"be given, {error}.",
+        )  # fmt: skip
     side = int(np.sign(form.speed_change))
     rest = int(np.sign(form.height_change))
     ends = "where the one without ends" if side == rest else "on the same side as the one without"
     largest = orbit.largest_multiplier
     if abs(largest) >= 1.0:
-        follows = "Without impacts the orbit is unstable"
+        follows = UNSTABLE_WITHOUT
     elif not form.lowers:
-        follows = (
-            "An impact raises the motion in a later period: no attractor with slight impacts is to "
-            "be expected, the motion jumps"
-        )
+        follows = f"An impact raises the motion in a later period: {JUMPS}"
     else:
         follows = f"An impact lowers all that follows: {_behind_grazing(abs(largest))}"
     sentence = (
-        f"{touched}. An orbit with one impact more exists {SIDES[side]} {hz}, {ends}; with the "
-        f"speed v of that impact a multiplier goes to infinity, as {form.growth:.4g} m/s / v. "
-        f"{follows}."
+        f"Grazing at {hz}: rigid {alone} is just touched. An orbit with one impact more exists "
+        f"{SIDES[side]} {hz}, {ends}; with the speed v of that impact a multiplier goes to "
+        f"infinity, as {form.growth:.4g} m/s / v. {follows}."
     )
     return NormalForm(
         "rigid grazing", sentence, Estimate(form.growth, GRAZING_ERROR * abs(form.growth)),
         Estimate(1.0 / form.speed_change, GRAZING_ERROR / abs(form.speed_change)), side,
         orbit.stable,
     )  # fmt: skip
+
+
+def _several_grazings(special: SpecialPoint, touches: Touches, form: RootMap) -> NormalForm:
+    """Grazing of an orbit in several touches at once: which orbits begin there, on either side."""
+    orbit, hz = special.orbit, _hz(special)
+    count, shorter, beside = len(touches.stops), minimal_period(orbit), form.beside
+    names = ", ".join(
+        _stop_name(orbit, stop, phase)
+        for stop, phase in zip(touches.stops, touches.phases.tolist(), strict=True)
+    )
+    touched = f"Grazing at {hz} in {NUMBERS.get(count, str(count))} touches at once: rigid {names}"
+    if shorter < orbit.period:
+        touched += f", of an orbit of period {shorter} run through {orbit.period // shorter} times"
+    every = count * shorter // orbit.period
+    sides = []
+    for side in (1, -1):
+        kinds = {  # one of those that are the same but for when they begin
+            min(each.hits[turn:] + each.hits[:turn] for turn in range(0, count, every)): None
+            for each in beside
+            if each.side == side
+        }
+        if kinds:
+            sides.append(f"{SIDES[side]} {hz} {', '.join(map(_with_impacts, kinds))}")
+    begin = f"Orbits begin here {'; '.join(sides)}" if sides else "Which orbits begin here is open"
+    if abs(orbit.largest_multiplier) >= 1.0:
+        follows = UNSTABLE_WITHOUT
+    elif not form.lowers:
+        follows = f"An impact raises the motion at a later touch: {JUMPS}"
+    else:
+        follows = "What else appears is not told by the normal form, which is that of one root"
+    hit = {each.side for each in beside if any(each.hits)}
+    return NormalForm(
+        "multiple rigid grazing",
+        f"{touched}. The map of the motion beside it has a root for each touch. {begin}; with the "
+        f"speeds of impacts at touches a multiplier goes to infinity. {follows}.",
+        side=hit.pop() if len(hit) == 1 else 0,
+        stable=orbit.stable,
+    )
+
+
+def _with_impacts(hits: tuple[bool, ...]) -> str:
+    """Say at which touches impacts are."""
+    places = [str(number) for number, hit in enumerate(hits, 1) if hit]
+    if not places:
+        return "without an impact"
+    if all(hits):
+        return "with an impact at each touch"
+    return f"with impacts at touch {' and '.join(places)} alone"
 
 
 def _behind_grazing(multiplier: float) -> str:

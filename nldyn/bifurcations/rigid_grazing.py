@@ -1,33 +1,172 @@
-"""What slight impacts make of an orbit that grazes a rigid stop: the map with a root.
+"""What slight impacts make of an orbit that grazes rigid stops: the map with a root.
 
 Where the motion would rise h beyond the stop it hits it with v = √(2 a h), a the deceleration at
 the touch, and leaves it with (1 + e) v less. Over a period that is z ↦ A z - (1 + e) v A b, with
 the Jacobian A without the impact and the change b of the state by an impulse that gives the gap
 the speed 1. With the row c of the penetration, its height h after k periods changes by
 -(1 + e) v c Aᵏ b.
+
+Of an orbit that grazes in several touches at once the same holds from each to the next. To first
+order its heights go with ln ω and with the speeds of the impacts; each touch either has an impact
+and no height, or a miss and no speed: a linear complementarity problem.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
 
 import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.bifurcations.normal_form_coefficients import CoefficientError
-from nldyn.bifurcations.rigid_touch import Touch
-from nldyn.orbits.conditions import Grazing
-from nldyn.orbits.orbit import Orbit
+from nldyn.bifurcations.rigid_touch import Touches
 
 SLIGHT = 1e-12  # speed in m/s at which restitution is that of the slightest impact
 FORGOTTEN = 1e-6  # share of a kick that is none
 MOST_PERIODS = 1000  # in which it is looked for
+MOST_TOUCHES = 10  # of which all mixtures of impacts and misses are looked at
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Orbits that begin at a grazing, with impacts at some of its touches and misses at the others.
+
+    Parameters
+    ----------
+    hits : tuple of bool
+        Which touches are impacts.
+    side : int
+        +1 if they exist above the frequency of the grazing, -1 below.
+    amounts : tuple of float
+        Speeds of the impacts in m/s and clearances of the misses in m, over the relative distance
+        in frequency.
+    """
+
+    hits: tuple[bool, ...]
+    side: int
+    amounts: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class RootMap:
+    """The map of the motion beside a grazing, from touch to touch.
+
+    Parameters
+    ----------
+    jacobians : (m, 2n, 2n)
+        From each touch to the next.
+    by_log_omega : (m, 2n)
+        Derivatives of the motion there.
+    rows, kicks : (m, 2n)
+        c and b of the touches.
+    losses, decelerations : (m,)
+        1 + e, and a in m/s².
+
+    References
+    ----------
+    A. B. Nordmark (1991), *J. Sound Vib.* 145, 279-297; M. H. Fredriksson and A. B. Nordmark
+    (1997), *Proc. R. Soc. A* 453, 1261-1276.
+    """
+
+    jacobians: Real
+    by_log_omega: Real
+    rows: Real
+    kicks: Real
+    losses: Real
+    decelerations: Real
+
+    @classmethod
+    def of(cls, touches: Touches) -> RootMap:
+        """That of an orbit that grazes.
+
+        Raises
+        ------
+        CoefficientError
+            If the motion does not turn at a stop.
+        ConvergenceError
+            If the flow map fails.
+        """
+        states, phases, omega = touches.states, touches.phases, touches.omega
+        flights = [
+            touches.shoot(*each) for each in zip(states, phases, touches.ends, strict=True)
+        ]
+        pace = [touches.rate(*each) for each in zip(states, phases, strict=True)]
+        rows, rates = touches.rows
+        decelerations = -omega * (rates * pace).sum(1)
+        if not (decelerations > 0.0).all():
+            raise CoefficientError("the motion does not turn at the stop")
+        return cls(
+            np.array([flight.jacobians[0] for flight in flights]),
+            omega * np.array([flight.d_omega[0] for flight in flights]),
+            rows, touches.kicks, touches.losses(np.full(len(rows), SLIGHT)), decelerations,
+        )  # fmt: skip
+
+    @cached_property
+    def heights(self) -> tuple[Real, Real]:
+        """Derivatives of the heights of periodic motions by ln ω (m,) and by the speeds (m, m)."""
+        m, n = self.rows.shape
+        matrix, right = np.eye(m * n), np.zeros((m * n, m + 1))
+        for i, follows in enumerate([*range(1, m), 0]):
+            before, behind = slice(i * n, (i + 1) * n), slice(follows * n, (follows + 1) * n)
+            matrix[behind, before] -= self.jacobians[i]
+            right[behind, 0] = self.by_log_omega[i]
+            right[behind, i + 1] = -self.losses[i] * (self.jacobians[i] @ self.kicks[i])
+        ways = np.linalg.solve(matrix, right).reshape(m, n, m + 1)
+        found = np.einsum("mn,mnk->mk", self.rows, ways)
+        return found[:, 0], found[:, 1:]
+
+    def effect(self, first: int, periods: int = 1) -> float:
+        """Of an impact on its own touch, some periods later: c A b."""
+        effect, m = self.kicks[first], len(self.rows)
+        for i in range(first, first + periods * m):
+            effect = self.jacobians[i % m] @ effect
+        return float(self.rows[first] @ effect)
+
+    @property
+    def lowers(self) -> bool:
+        """Whether an impact lowers the motion at all touches that follow: c Aᵏ b > 0."""
+        return all(self._lowers(first) for first in range(len(self.rows)))
+
+    def _lowers(self, first: int) -> bool:
+        effect, largest, m = self.kicks[first], 0.0, len(self.rows)
+        for i in range(first, first + m * MOST_PERIODS):
+            effect, row = self.jacobians[i % m] @ effect, self.rows[(i + 1) % m]
+            size = float(np.abs(row) @ np.abs(effect))
+            largest = max(largest, size)
+            if size <= FORGOTTEN * largest:
+                return True
+            if row @ effect <= 0.0:
+                return False
+        return True
+
+    def with_hits(self, hits: tuple[bool, ...]) -> Beside | None:
+        """The orbits with impacts at some touches, if they begin at the grazing."""
+        by_omega, by_speed = self.heights
+        hit, amounts = np.array(hits), np.empty(len(hits))
+        amounts[hit] = np.linalg.solve(by_speed[hit][:, hit], -by_omega[hit])
+        amounts[~hit] = -by_omega[~hit] - by_speed[~hit][:, hit] @ amounts[hit]
+        side = int(np.sign(amounts[0]))
+        if not (side * amounts > 0.0).all():
+            return None
+        return Beside(hits, side, tuple((side * amounts).tolist()))
+
+    @property
+    def beside(self) -> list[Beside]:
+        """All orbits that begin at the grazing, those without impacts first.
+
+        Empty where there are too many touches to tell.
+        """
+        m = len(self.rows)
+        mixtures = sorted(product((False, True), repeat=m), key=sum) if m <= MOST_TOUCHES else []
+        found = (self.with_hits(hits) for hits in mixtures)
+        return [beside for beside in found if beside is not None]
 
 
 @dataclass(frozen=True)
 class RigidGrazing:
-    """The normal form of a grazing.
+    """The normal form of a grazing in one touch.
 
     Parameters
     ----------
@@ -41,11 +180,6 @@ class RigidGrazing:
         d' in m: without impacts the orbit exists where that has led below the stop.
     lowers : bool
         Whether an impact lowers the motion in each of the following periods: all c Aᵏ b > 0.
-
-    References
-    ----------
-    A. B. Nordmark (1991), *J. Sound Vib.* 145, 279-297; M. H. Fredriksson and A. B. Nordmark
-    (1997), *Proc. R. Soc. A* 453, 1261-1276.
     """
 
     growth: float
@@ -53,49 +187,21 @@ class RigidGrazing:
     height_change: float
     lowers: bool
 
+    @classmethod
+    def of(cls, form: RootMap) -> RigidGrazing:
+        """That of a map with one touch.
 
-def rigid_grazing_form(orbit: Orbit, grazing: Grazing) -> RigidGrazing:
-    """Normal form of an orbit that grazes a rigid stop.
-
-    Raises
-    ------
-    CoefficientError
-        If it does not graze, or the flow map fails.
-    ConvergenceError, SystemModelError
-        The same.
-    """
-    touch = Touch.of(orbit, grazing)
-    state, phase, omega, kick = touch.state, touch.phase, touch.omega, touch.kick
-    flow = orbit.problem.flow
-    row, rate = flow.rows[grazing.stop], flow.rate_rows[grazing.stop]
-    around = touch.shoot(state, phase, phase + 2.0 * math.pi * orbit.period)
-    jacobian, deceleration = around.jacobians[0], -omega * float(rate @ touch.rate(state, phase))
-    if not deceleration > 0.0:
-        raise CoefficientError("the motion does not turn at the stop")
-    loss = touch.loss(SLIGHT)
-    ways = np.linalg.solve(np.eye(len(row)) - jacobian, np.column_stack(
-        [jacobian @ kick, omega * around.d_omega[0]]
-    ))  # fmt: skip
-    first, height_change = row @ ways
-    if first == 0.0:
-        raise CoefficientError("an impact leaves no trace over a period")
-    return RigidGrazing(
-        growth=float(-loss * deceleration * (row @ jacobian @ kick)),
-        speed_change=float(height_change / (loss * first)),
-        height_change=float(height_change),
-        lowers=_lowers(jacobian, row, kick),
-    )
-
-
-def _lowers(jacobian: Real, row: Real, kick: Real) -> bool:
-    """Whether all effects of a kick on a penetration, period after period, are positive."""
-    effect, largest = kick, 0.0
-    for _ in range(MOST_PERIODS):
-        effect = jacobian @ effect
-        size = float(np.abs(row) @ np.abs(effect))
-        largest = max(largest, size)
-        if size <= FORGOTTEN * largest:
-            return True
-        if row @ effect <= 0.0:
-            return False
-    return True
+        Raises
+        ------
+        CoefficientError
+            If an impact leaves no trace.
+        """
+        (height_change,), ((by_speed,),) = form.heights
+        if by_speed == 0.0:
+            raise CoefficientError("an impact leaves no trace over a period")
+        return cls(
+            growth=float(-form.losses[0] * form.decelerations[0] * form.effect(0)),
+            speed_change=float(-height_change / by_speed),
+            height_change=float(height_change),
+            lowers=form.lowers,
+        )

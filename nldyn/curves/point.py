@@ -122,7 +122,7 @@ def curve_point(
         length = -length
     renewed, along = condition.renewed(found.at), found.along
     if isinstance(renewed, Grazing):  # whose rigid stop is passed where the extreme is now
-        family = found.at.family.past(renewed.passage)
+        family = found.at.family.past(renewed.passages)
         found = replace(found, at=Evaluation(family, found.at.point))
     return CurvePoint(found, renewed, along / length, arclength)
 

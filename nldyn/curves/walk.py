@@ -177,7 +177,7 @@ class CurveWalk:
             self._obstacle = found.failure
             return None
         self._obstacle = "what Newton's method finds is not the next point of the curve"
-        if family.passage is None and loses_impact(found.orbit):
+        if not family.passages and loses_impact(found.orbit):
             return None
         miss = metric_length(weights, found.at.point - predicted) / step
         off = metric_length(weights, found.at.point - straight)

@@ -194,7 +194,7 @@ def _read_marks(
 
 def _past(family: OrbitFamily, condition: Condition) -> OrbitFamily:
     """The family with the rigid stop that a grazing passes."""
-    return family.past(condition.passage) if isinstance(condition, Grazing) else family
+    return family.past(condition.passages) if isinstance(condition, Grazing) else family
 
 
 def _read_conditions(

@@ -81,8 +81,8 @@ class OrbitFamily:
         The parameters.
     unfolding : (N,) array, optional
         Direction that is added to the shooting equations, times one more unknown.
-    passage : Passage, optional
-        Where a rigid stop lets the motions pass.
+    passages : tuple of Passage
+        Where rigid stops let the motions pass.
     start : float
         Forcing phase of the first state, less than a segment's: orbits have it at zero.
     """
@@ -95,7 +95,7 @@ class OrbitFamily:
     frequency_hz: float
     charts: tuple[Chart, ...]
     unfolding: Real | None = None
-    passage: Passage | None = None
+    passages: tuple[Passage, ...] = ()
     start: float = 0.0
 
     @classmethod
@@ -116,9 +116,9 @@ class OrbitFamily:
         """The family with a direction added to its equations."""
         return replace(self, unfolding=direction)
 
-    def past(self, passage: Passage | None) -> OrbitFamily:
-        """The family of motions past a rigid stop."""
-        return self if passage == self.passage else replace(self, passage=passage)
+    def past(self, passages: tuple[Passage, ...]) -> OrbitFamily:
+        """The family of motions past rigid stops."""
+        return self if passages == self.passages else replace(self, passages=passages)
 
     @property
     def n_states(self) -> int:
@@ -135,7 +135,7 @@ class OrbitFamily:
         nodes = orbit.problem.nodes(orbit.point)
         if self.start:
             carried = [
-                _carried(orbit.problem, self.passage, node, phase, phase + self.start, orbit.omega)
+                _carried(orbit.problem, self.passages, node, phase, phase + self.start, orbit.omega)
                 for node, phase in zip(nodes, orbit.problem.phases.tolist(), strict=False)
             ]
             nodes = np.array(carried)
@@ -233,9 +233,9 @@ class Evaluation:
         return self._shot(True, exact)
 
     def _shot(self, sensitivities: bool, parameters: Sequence[Parameter] = ()) -> Segments:
-        problem, passage = self.problem, self.family.passage
+        problem, passages = self.problem, self.family.passages
         return shoot_past(
-            problem, passage, self.nodes, problem.phases, self.omega, sensitivities, parameters
+            problem, passages, self.nodes, problem.phases, self.omega, sensitivities, parameters
         )
 
     def _back(self, ends: Real) -> Real:
@@ -309,7 +309,7 @@ class Evaluation:
         """The same orbit by its states at the phases that orbits have."""
         family, phases = self.family, self.problem.phases.tolist()
         ends = [
-            _carried(self.problem, family.passage, node, first, last - family.start, self.omega)
+            _carried(self.problem, family.passages, node, first, last - family.start, self.omega)
             for node, first, last in zip(self.nodes, phases, phases[1:], strict=False)
         ]
         point = self.point.copy()
@@ -319,7 +319,7 @@ class Evaluation:
 
 def _carried(
     problem: ShootingProblem,
-    passage: Passage | None,
+    passages: tuple[Passage, ...],
     state: Real,
     first: float,
     last: float,
@@ -327,7 +327,7 @@ def _carried(
 ) -> Real:
     """State (2n,) at a later phase."""
     phases = np.array([first, last])
-    return np.asarray(shoot_past(problem, passage, state[None], phases, omega, False).ends[0])
+    return np.asarray(shoot_past(problem, passages, state[None], phases, omega, False).ends[0])
 
 
 class Condition(Protocol):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -39,6 +40,7 @@ BESIDE = 3e-3  # of an orbit's size: a crossing within it belongs to a turn
 TOUCH = 1e-6  # of an orbit's size: depth of a touch beside its grazing point
 LEVEL, ALIKE = 1e-4, 1e-9  # relative difference of two extremes about to change places, or one
 SAME_EXTREME = 1e-2  # rad between an extreme and itself on a neighbouring orbit
+TOGETHER = 1e-10  # of an orbit's size: depth of touches that graze at once
 ALL_GRAZE = 1e-4  # of an orbit's size: depth in each excitation period that grazes in each
 CLEAR = 1e-12  # of an orbit's size: distance to a sharp touch that counts as none
 WIDEST_PASSAGE = 0.5  # rad on either side of a grazing, in which a rigid stop is not there
@@ -213,6 +215,8 @@ class Grazing:
         Phase on either side in which a rigid stop is not there; zero for an elastic one.
     every : float
         Phase after which that comes again, see `Passage`.
+    others : tuple of Passage
+        Of other touches of rigid stops, which may graze at the same time.
     """
 
     stop: int
@@ -222,6 +226,7 @@ class Grazing:
     depth: float = 0.0
     half: float = 0.0
     every: float = 0.0
+    others: tuple[Passage, ...] = ()
 
     @classmethod
     def of(cls, orbit: Orbit) -> Grazing:
@@ -261,10 +266,46 @@ class Grazing:
         every = 2.0 * math.pi if alike == orbit.period else full
         return replace(self, half=half, every=every)
 
+    def with_others(self, orbit: Orbit) -> Grazing:
+        """The same where all other touches of rigid stops that may graze, too, are let past."""
+        if not self.half:
+            return self
+        let_past = [Passage(self.stop, self.phase, self.half, self.every)]
+        for stop, each in enumerate(orbit.system.stops):
+            found = orbit.touches(stop)
+            slight = found.is_maximum & (np.abs(found.values) < ALL_GRAZE * self.unit)
+            for phase in found.phases[slight & isinstance(each, RigidStop)].tolist():
+                if not any(one.stop == stop and one.holds(phase) for one in let_past):
+                    other = Grazing(stop, True, phase, self.unit)._beside(orbit)
+                    let_past.append(Passage(stop, phase, other.half, other.every))
+        return replace(self, others=tuple(let_past[1:]))
+
+    def grazing_too(self, orbit: Orbit) -> Grazing:
+        """The same on an orbit that grazes, with those others that do so, too, within rounding.
+
+        Raises
+        ------
+        ConvergenceError
+            If the flow map fails, or another touch that was let past is an impact.
+        """
+        together, nodes = [], orbit.problem.nodes(orbit.point)
+        for which, other in enumerate(self.others, 1):
+            depth = peak_past(orbit.problem, self.passages, nodes, orbit.omega, which)[1]
+            if depth > TOGETHER * self.unit:
+                raise ConvergenceError("an impact was let past")
+            if depth > -TOGETHER * self.unit:
+                together.append(other)
+        return replace(self, others=tuple(together))
+
+    def defined(self, family: OrbitFamily, _: Orbit) -> tuple[OrbitFamily, Condition]:
+        """The family in which this is solved, with the condition, as `defined_by` gives them."""
+        return family.past(self.passages), self
+
     @property
-    def passage(self) -> Passage | None:
-        """Where a rigid stop lets the motion pass."""
-        return Passage(self.stop, self.phase, self.half, self.every) if self.half else None
+    def passages(self) -> tuple[Passage, ...]:
+        """Where rigid stops let the motion pass, that of this grazing first."""
+        own = Passage(self.stop, self.phase, self.half, self.every)
+        return (own, *self.others) if self.half else ()
 
     def value(self, at: Evaluation) -> Real:
         """Depth of the extreme, shape (1,).
@@ -279,10 +320,9 @@ class Grazing:
 
     def _reached(self, at: Evaluation) -> tuple[float, float]:
         """Phase and depth of the extreme, also beyond a rigid stop."""
-        passage = self.passage
-        if passage is None:
+        if not self.passages:
             return self.extreme(at.orbit)
-        return peak_past(at.problem, passage, at.nodes, at.omega)
+        return peak_past(at.problem, self.passages, at.nodes, at.omega)
 
     def reach(self, at: Evaluation) -> float:
         """The depth of an extreme has a continuous derivative also where it is zero."""
@@ -589,17 +629,42 @@ def nearest_flip(orbit: Orbit) -> Orbit | None:
 
 
 def nearest_grazing(orbit: Orbit) -> Orbit | None:
-    """The grazing beside an orbit, by its defining system; without the slight impact."""
-    found = _beside("GR", orbit)
-    return None if found is None else replace(found.orbit, problem=orbit.problem)
+    """The grazing beside an orbit, by its defining system; without the slight impact.
+
+    Where several touches graze at once, without any of these.
+    """
+    try:
+        alone = Grazing.of(orbit)
+        together = alone.with_others(orbit)
+    except SystemModelError:
+        return None
+    for grazing in (together, alone) if together.others else (alone,):
+        found = _solved(orbit, grazing.defined)
+        if found is None:
+            continue
+        try:
+            grazing.grazing_too(found.orbit)
+            return replace(found.orbit, problem=orbit.problem)
+        except ConvergenceError:
+            continue
+    return None
 
 
 def _beside(kind: str, orbit: Orbit, first_step: float = math.inf) -> Corrected | None:
     """The special point of a kind beside an orbit."""
+    return _solved(orbit, partial(defined_by, kind), first_step)
+
+
+def _solved(
+    orbit: Orbit,
+    define: Callable[[OrbitFamily, Orbit], tuple[OrbitFamily, Condition]],
+    first_step: float = math.inf,
+) -> Corrected | None:
+    """What meets a condition beside an orbit, in the family in which that is solved."""
     hz = orbit.frequency_hz
     family = OrbitFamily.around(orbit, (Chart(Parameter(FREQUENCY), 0.5 * hz, 2.0 * hz),))
     try:
-        family, condition = defined_by(kind, family, orbit)
+        family, condition = define(family, orbit)
         guess = family.unknowns(orbit)
         found = correct(family, guess, condition, first_step=first_step)
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
@@ -621,8 +686,7 @@ def defined_by(kind: str, family: OrbitFamily, orbit: Orbit) -> tuple[OrbitFamil
         condition = BranchPointCondition.of(family.at(guess))
         return family.unfolded(condition.left * family.scale(guess)), condition
     if kind == "GR":
-        grazing = Grazing.of(orbit)
-        return family.past(grazing.passage), grazing
+        return Grazing.of(orbit).defined(family, orbit)
     if kind in KINDS:
         if kind == "NS" and orbit.system.size < 2:
             raise SystemModelError("a Neimark-Sacker point needs at least two modes")

@@ -9,7 +9,7 @@ Systems*, ch. 6).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -54,38 +54,41 @@ class Passage:
         """Forcing phase at which it ends."""
         return self.phase + self.half
 
-    def opened(self, flow: FlowMap, size: float) -> FlowMap:
-        """The flow map without the stop, for states of a size."""
-        stops = list(flow.system.stops)
-        reach = size * max(float(np.linalg.norm(flow.rows[self.stop])), 1.0)
-        gap = OUT_OF_REACH * (stops[self.stop].gap + reach)
-        stops[self.stop] = replace(stops[self.stop], gap=gap)
-        return FlowMap(flow.system.with_elements(stops=tuple(stops)), flow.options)
-
-    def cuts(self, first: float, last: float) -> tuple[list[float], list[bool]]:
-        """Phases (k + 1,) that cut a segment where the passage begins and ends, and its pieces.
-
-        Each piece (k,) lies within it or not.
-        """
-        ends = {first, last}
+    def cuts(self, first: float, last: float) -> list[float]:
+        """Phases within a segment at which the passage begins or ends."""
         earliest = math.floor((first - self.end) / self.every)
         latest = math.ceil((last - self.begin) / self.every)
-        for turn in range(earliest, latest + 1):
-            both = (self.begin + turn * self.every, self.end + turn * self.every)
-            ends.update(phase for phase in both if first < phase < last)
-        phases = sorted(ends)
-        middles = [0.5 * (a + b) for a, b in pairwise(phases)]
-        return phases, [self.holds(middle) for middle in middles]
+        turns = self.every * np.arange(earliest, latest + 1)
+        ends = np.concatenate([self.begin + turns, self.end + turns])
+        return [float(end) for end in ends[(first < ends) & (ends < last)]]
 
     def holds(self, phase: float) -> bool:
         """Whether a phase lies within."""
+        return self._apart(phase) < self.half
+
+    def overlaps(self, other: Passage) -> bool:
+        """Whether they have phases in common."""
+        return self._apart(other.phase) < self.half + other.half
+
+    def _apart(self, phase: float) -> float:
         every = self.every
-        return abs((phase - self.phase + 0.5 * every) % every - 0.5 * every) < self.half
+        return abs((phase - self.phase + 0.5 * every) % every - 0.5 * every)
+
+
+def opened(flow: FlowMap, left_out: Collection[int], size: float) -> FlowMap:
+    """The flow map without some stops, for states of a size."""
+    if not left_out:
+        return flow
+    stops = list(flow.system.stops)
+    for stop in left_out:
+        reach = size * max(float(np.linalg.norm(flow.rows[stop])), 1.0)
+        stops[stop] = replace(stops[stop], gap=OUT_OF_REACH * (stops[stop].gap + reach))
+    return FlowMap(flow.system.with_elements(stops=tuple(stops)), flow.options)
 
 
 def shoot_past(
     problem: ShootingProblem,
-    passage: Passage | None,
+    passages: Sequence[Passage],
     nodes: Real,
     phases: Real,
     omega: float,
@@ -93,10 +96,9 @@ def shoot_past(
     parameters: Sequence[Parameter] = (),
     size: float = 0.0,
 ) -> Segments:
-    """What `FlowMap.shoot` gives for states (k, 2n) at phases (k + 1,), past a stop if there is a
-    passage.
+    """What `FlowMap.shoot` gives for states (k, 2n) at phases (k + 1,), past stops in passages.
 
-    The stop left out is out of reach of states of their size, or of `size` if that is larger.
+    A stop left out is out of reach of states of their size, or of `size` if that is larger.
 
     Raises
     ------
@@ -104,15 +106,21 @@ def shoot_past(
         If the flow map fails.
     """
     flow = problem.flow
-    if passage is None:
+    if not passages:
         return _shot(flow, nodes, phases, omega, sensitivities, parameters)
-    open_flow = passage.opened(flow, max(size, float(np.abs(nodes).max())))
+    size = max(size, float(np.abs(nodes).max()))
+    flows: dict[frozenset[int], FlowMap] = {}
     found = []
     for node, first, last in zip(nodes, phases[:-1].tolist(), phases[1:].tolist(), strict=True):
-        cuts, within = passage.cuts(first, last)
-        found.append(
-            _chained(open_flow, flow, cuts, within, node, omega, sensitivities, parameters)
-        )
+        cuts = sorted({first, last, *(x for each in passages for x in each.cuts(first, last))})
+        pieces = []
+        for begin, end in pairwise(cuts):
+            middle = 0.5 * (begin + end)
+            left_out = frozenset(each.stop for each in passages if each.holds(middle))
+            if left_out not in flows:
+                flows[left_out] = opened(flow, left_out, size)
+            pieces.append((flows[left_out], np.array([begin, end])))
+        found.append(_chained(pieces, node, omega, sensitivities, parameters))
     return Segments(
         np.concatenate([segment.ends for segment in found]),
         np.concatenate([segment.jacobians for segment in found]),
@@ -139,20 +147,16 @@ def _shot(
 
 
 def _chained(
-    open_flow: FlowMap,
-    flow: FlowMap,
-    phases: Sequence[float],
-    within: Sequence[bool],
+    pieces: Sequence[tuple[FlowMap, Real]],
     node: Real,
     omega: float,
     sensitivities: bool,
     parameters: Sequence[Parameter],
 ) -> Segments:
-    """One segment, piece by piece."""
+    """One segment, by the flow maps of its pieces."""
     whole: Segments | None = None
-    for first, last, inside in zip(phases[:-1], phases[1:], within, strict=True):
-        across, phases_here = open_flow if inside else flow, np.array([first, last])
-        piece = _shot(across, node[None], phases_here, omega, sensitivities, parameters)
+    for flow, phases in pieces:
+        piece = _shot(flow, node[None], phases, omega, sensitivities, parameters)
         node = piece.ends[0]
         if whole is None:
             whole = piece
@@ -171,24 +175,27 @@ def _chained(
 
 
 def peak_past(
-    problem: ShootingProblem, passage: Passage, nodes: Real, omega: float
+    problem: ShootingProblem, passages: Sequence[Passage], nodes: Real, omega: float, which: int = 0
 ) -> tuple[float, float]:
-    """Phase and penetration of the maximum nearest to the middle of a passage, past its stop.
+    """Phase and penetration of the maximum nearest to the middle of a passage, past the stops.
 
     Raises
     ------
     ConvergenceError
         If there is none, or the flow map fails.
     """
-    flow, phases = problem.flow, problem.phases
+    flow, phases, passage = problem.flow, problem.phases, passages[which]
     full = 2.0 * math.pi * problem.period
     begin = (passage.begin - problem.start) % full + problem.start
     j = min(int(np.searchsorted(phases, begin, side="right")) - 1, problem.segments - 1)
-    state = nodes[j]
+    state, size = nodes[j], float(np.abs(nodes).max())
     if begin > phases[j]:
-        state = _shot(flow, state[None], np.array([phases[j], begin]), omega, False, ()).ends[0]
-    open_flow = passage.opened(flow, float(np.abs(nodes).max()))
-    motion = open_flow.trajectory(state[None], np.array([begin, begin + 2.0 * passage.half]), omega)
+        carried = np.array([phases[j], begin])
+        state = shoot_past(problem, passages, state[None], carried, omega, False, size=size).ends[0]
+    beside = {each.stop for each in passages if each.overlaps(passage)}
+    motion = opened(flow, beside, size).trajectory(
+        state[None], np.array([begin, begin + 2.0 * passage.half]), omega
+    )
     if motion.failure:
         raise ConvergenceError(motion.failure)
     peaks = motion.extremes(passage.stop)

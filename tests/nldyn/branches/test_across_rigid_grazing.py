@@ -14,6 +14,7 @@ from nldyn import (
     System,
     continue_branch,
     impacts,
+    normal_form,
     solve_orbit,
 )
 from nldyn.branches.endings import Ending
@@ -89,14 +90,75 @@ def test_a_branch_that_has_crossed_a_grazing_is_extended_to_the_same_digits():
     assert [s.kind for s in longer.special_points] == [s.kind for s in whole.special_points]
 
 
-def test_two_stops_grazed_at_once_end_a_branch():
-    """A symmetric motion between two stops: what lies behind is not looked for."""
-    stops = [RigidStop("x0", RESTITUTION, GAP, direction=side) for side in (1, -1)]
-    branch = continue_branch(
-        solve_orbit(system_of(([[1.0]], [[1.0]], [[0.1]]), [1.0], stops), 0.45), (0.25, 0.5)
-    )
+def between_two_stops(restitution=RESTITUTION):
+    stops = [RigidStop("x0", e, GAP, side) for side, e in ((1, RESTITUTION), (-1, restitution))]
+    return system_of(ACROSS["in its place"][0], [1.0], stops)
+
+
+def pair_of_impacts():
+    return OneImpact([[1.0]], [[1.0]], [[0.1]], [1.0], [1.0], GAP, RESTITUTION)
+
+
+def test_two_stops_grazed_at_once_by_symmetry_are_passed_by_a_pair_of_impacts():
+    """The slower one of both mirrored motions of the closed form, from either side."""
+    shape = pair_of_impacts()
+    branch = continue_branch(solve_orbit(between_two_stops(), 0.45), (0.25, 0.5))
+    (touch,) = branch.special_points
+    assert touch.orbit.impacts == 0
+    assert abs(shape.response(touch.orbit.omega)[0]) == pytest.approx(GAP, rel=1e-10)
+    form = normal_form(touch)
+    assert (touch.kind, form.name, form.side) == ("GR", "multiple rigid grazing", 1)
+    assert "without an impact, with an impact at each touch" in form.sentence
+    pairs = [orbit for orbit in branch.points if orbit.impacts]
+    assert len(pairs) > 10
+    assert min(impacts(orbit).speed[0] for orbit in pairs) < 1e-4 * GAP * touch.orbit.omega
+    for orbit in pairs:
+        exact = shape.motions(orbit.omega, 0.5)[-1].speed
+        fastest = orbit.max_abs_displacement * orbit.omega
+        assert np.abs(impacts(orbit).speed ** 2 - exact**2).max() < 1e-10 * fastest**2
+    again = continue_branch(pairs[len(pairs) // 2], (0.25, 0.5))
+    (back,) = again.special_points
+    assert back.frequency_hz == pytest.approx(touch.frequency_hz, rel=1e-10)
+    assert not again.notes
+    assert min(orbit.impacts for orbit in again.points) == 0
+
+
+def test_two_stops_grazed_at_once_are_passed_without_symmetry():
+    """The stops differ in their restitution: the orbit behind has an impact at each of them."""
+    branch = continue_branch(solve_orbit(between_two_stops(0.6), 0.45), (0.25, 0.5))
+    (touch,) = branch.special_points
+    assert abs(pair_of_impacts().response(touch.orbit.omega)[0]) == pytest.approx(GAP, rel=1e-10)
+    assert [reason.ending for reason in branch.stop_reasons] == [Ending.RANGE_END] * 2
+    last = max((orbit for orbit in branch.points if orbit.impacts), key=lambda o: o.frequency_hz)
+    hits = impacts(last)
+    assert last.frequency_hz == pytest.approx(0.5)
+    assert (hits.impulse / hits.speed)[np.argsort(hits.stop)] == pytest.approx([1.8, 1.6])
+
+
+def test_two_stops_tuned_to_graze_at_once_end_a_branch_where_three_kinds_of_orbits_begin():
+    """Each alone is that of the closed form: the other mass stays clear of its stop."""
+    matrices, force = TWO, [1.0, 0.3]
+    omega, rows = TURN * 0.52, np.eye(2)
+    linear = OneImpact(*matrices, force, rows[0], 1.0, 1.0)
+    gaps = np.abs(linear.response(omega)[:2])
+    stops = [RigidStop(f"x{i}", 0.8, gaps[i]) for i in range(2)]
+    branch = continue_branch(solve_orbit(system_of(matrices, force, stops), 0.56), (0.48, 0.58))
+    (touch,) = branch.special_points
+    assert touch.frequency_hz == pytest.approx(0.52, rel=1e-10)
     assert branch.stop_reasons[0].ending is Ending.GRAZES_RIGID
-    assert branch.special_points[0].kind == "GR"
+    sentence = normal_form(touch).sentence
+    assert "above 0.52 Hz without an impact; below 0.52 Hz" in sentence
+    for i, j in ((0, 1), (1, 0)):
+        assert f"with impacts at touch {i + 1} alone" in sentence
+        shape = OneImpact(*matrices, force, rows[i], gaps[i], 0.8)
+        assert not [m for m in shape.motions(1.0001 * omega, 1) if m.speed < 0.01]
+        motion = shape.motions(0.9999 * omega, 1)[-1]
+        assert 0.0 < motion.speed < 0.01
+        way = [
+            shape.state(0.9999 * omega, motion, motion.phase + p)[j]
+            for p in np.linspace(0.0, TURN, 2000)
+        ]
+        assert max(way) < gaps[j]
 
 
 def test_a_branch_with_rest_steps_over_all_impacts_that_pass_a_phase_of_shooting():
