@@ -13,11 +13,12 @@ from cms.base.arrays import FloatArray
 from cms.base.errors import ReductionError
 from cms.checks.checks import check_belongs
 from cms.component.component import ComponentLike, Pencil, checked_pencil, times
-from cms.reduction.constraint import FixedInterface, fixed_interface
+from cms.reduction.constraint import fixed_interface
 from cms.reduction.inertia import elastic_solutions
 from cms.reduction.model import ReducedModel, positive
 from cms.reduction.residual import residual_flexibility, without_modes
-from cms.solvers.eigen import Modes, lowest_modes, shifted_factor, without_offsets
+from cms.reduction.seen import lowest_seen_modes
+from cms.solvers.eigen import Modes, Shifted, lowest_modes, shifted_factor, without_offsets
 
 NO_MODE = 1e8  # relative residual of what is no mode at all; its square is still a number
 NEGATIVE = 1e-9  # of the largest: an eigenvalue that is not rounding
@@ -228,7 +229,7 @@ def accuracy(component: ComponentLike, reduced: ReducedModel) -> Accuracy:
         return accuracy_fixed(pencil, reduced)
     shifted = shifted_factor(pencil)
     pencil = without_offsets(pencil, shifted)
-    modes = lowest_modes(pencil, shifted, min(reduced.modes + 1, pencil.size))
+    modes = with_next(pencil, shifted, reduced, pencil.loads)
     kept = modes.vectors[:, : reduced.modes]
     if reduced.method in ("truncation", "macneal"):
         shapes = residual_flexibility(pencil, shifted, kept)
@@ -251,18 +252,20 @@ def accuracy_fixed(pencil: Pencil, reduced: ReducedModel) -> Accuracy:
     if fixed.shifted.rigid:
         raise ReductionError("the error is known only where the interfaces hold the component")
     inner = fixed.interior
-    modes = lowest_modes(inner, fixed.shifted, min(reduced.modes + 1, inner.size))
+    load = fixed.inertia_of_constraint_modes()
+    modes = with_next(inner, fixed.shifted, reduced, load)
     kept = modes.vectors[:, : reduced.modes]
-    load = inertia_of_constraint_modes(fixed)
     load = load - times(inner.mass, kept) @ (kept.T @ load)
     gram = load.T @ without_modes(elastic_solutions(inner, fixed.shifted, load), kept, inner)
     return Accuracy(reduced, next_frequency(modes, reduced.modes), semidefinite(gram))
 
 
-def inertia_of_constraint_modes(fixed: FixedInterface) -> FloatArray:
-    """``M Psi_c`` at the interior dofs, (n, m)."""
-    inertia = times(fixed.whole.mass, fixed.constraint_modes)
-    return np.asarray(fixed.turn.T @ inertia)[: fixed.interior.size]
+def with_next(pencil: Pencil, shifted: Shifted, reduced: ReducedModel, loads: FloatArray) -> Modes:
+    """The kept modes of a model and, if there is one, the next that a load moves."""
+    count = min(reduced.modes + 1, pencil.size)
+    if reduced.unseen_modes:
+        return lowest_modes(pencil, shifted, count)
+    return lowest_seen_modes(pencil, shifted, count, loads)[0]
 
 
 def next_frequency(modes: Modes, kept: int) -> float:

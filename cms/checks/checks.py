@@ -20,6 +20,7 @@ from cms.component.component import (
 )
 from cms.reduction.inertia import elastic_solutions, quotient
 from cms.reduction.model import ReducedModel
+from cms.reduction.seen import told_of_left_out
 from cms.solvers.eigen import Shifted, lowest_modes, shifted_factor, without_offsets
 
 ONE_FREQUENCY = 1e-6  # modes nearer than this may be turned among each other
@@ -54,6 +55,8 @@ class Checks:
         As `ReducedModel.rigid_bound_hz`.
     unseen_modes : tuple of int
         As `ReducedModel.unseen_modes`.
+    left_out_hz : tuple of float
+        As `ReducedModel.left_out_hz`.
     """
 
     mass_orthogonality: float
@@ -67,6 +70,7 @@ class Checks:
     mac: FloatArray
     rigid_bound_hz: float = 0.0
     unseen_modes: tuple[int, ...] = ()
+    left_out_hz: tuple[float, ...] = ()
 
     def report(self) -> str:
         """The checks as text, a line each."""
@@ -80,6 +84,7 @@ class Checks:
         if self.unseen_modes:
             numbers = ", ".join(map(str, self.unseen_modes))
             lines.append(f"kept modes that move no interface: {numbers}")
+        lines += told_of_left_out(self.left_out_hz)
         for name, error in self.static_recovery.items():
             lines.append(f"static recovery of a load at '{name}': error {error:.1e}")
         for name, mass in self.direction_mass.items():
@@ -165,6 +170,7 @@ def check(
         mac=values,
         rigid_bound_hz=reduced.rigid_bound_hz,
         unseen_modes=reduced.unseen_modes,
+        left_out_hz=reduced.left_out_hz,
     )
 
 

@@ -50,6 +50,11 @@ class FixedInterface:
         held = np.zeros((self.whole.size - vectors.shape[0], vectors.shape[1]))
         return times(self.turn, np.vstack([vectors, held]))
 
+    def inertia_of_constraint_modes(self) -> FloatArray:
+        """``M Psi_c`` at the interior dofs, (n, m)."""
+        inertia = times(self.whole.mass, self.constraint_modes)
+        return np.asarray(self.turn.T @ inertia)[: self.interior.size]
+
 
 def fixed_interface(pencil: Pencil) -> FixedInterface:
     """Take the interfaces' displacements as coordinates and factorise what is between them.

@@ -75,6 +75,8 @@ class Assembly:
         Rows of each component.
     load_vectors : tuple of str
         Names of those interfaces of the coupled model that are load vectors.
+    left_out_hz : tuple of float
+        Of all components, see `ReducedModel`.
     """
 
     places: list[Place]
@@ -86,6 +88,7 @@ class Assembly:
     shapes: FloatArray
     components: Mapping[str, tuple[int, int]]
     load_vectors: tuple[str, ...] = ()
+    left_out_hz: tuple[float, ...] = ()
 
     def joint_rows(self, joints: Sequence[Joint]) -> FloatArray:
         """Signed interface displacements that open each joint, (j, m)."""
@@ -379,6 +382,7 @@ def side_by_side(components: Mapping[str, ReducedModel]) -> Assembly:
         load_vectors=tuple(
             f"{name}.{at}" for name, model in components.items() for at in model.load_vectors
         ),
+        left_out_hz=tuple(hz for model in models for hz in model.left_out_hz),
         components={
             name: (int(end - size), int(end))
             for name, size, end in zip(components, sizes, ends, strict=True)
@@ -474,6 +478,7 @@ def model_of(
         residual_shapes=shapes if massless else None,
         components=assembly.components,
         load_vectors=assembly.load_vectors,
+        left_out_hz=assembly.left_out_hz,
     )
 
 

@@ -62,6 +62,9 @@ class ReducedModel:
         Rows of the basis that belong to each component of a coupled model.
     load_vectors : tuple of str
         Names of those interfaces that are load vectors: of weight, or of a motion of the base.
+    left_out_hz : tuple of float
+        Frequencies in Hz of modes below the last kept one that are left out, as no interface sees
+        them.
     rigid_bound_hz : float
         Up to where the few digits of given matrices leave the frequency of rigid-body modes
         undetermined; those below are zero. 0 for matrices in double precision.
@@ -89,6 +92,7 @@ class ReducedModel:
     components: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     rigid_bound_hz: float = 0.0
     load_vectors: tuple[str, ...] = ()
+    left_out_hz: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the shapes and make the arrays read-only."""
@@ -371,6 +375,7 @@ class ReducedModel:
             "method": np.array(self.method),
             "rigid_bound_hz": np.array(self.rigid_bound_hz),
             "load_vectors": np.array(self.load_vectors, dtype=np.str_),
+            "left_out_hz": np.array(self.left_out_hz),
             "components": np.array(list(self.components), dtype=np.str_),
             "component_rows": np.array(list(self.components.values()), dtype=np.int64),
         }
@@ -463,6 +468,7 @@ def later_fields(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
         "components": dict(zip(names, rows, strict=True)),
         "rigid_bound_hz": float(arrays.get("rigid_bound_hz", 0.0)),
         "load_vectors": tuple(str(name) for name in arrays.get("load_vectors", ())),
+        "left_out_hz": tuple(float(hz) for hz in arrays.get("left_out_hz", ())),
         **{name: arrays[name] for name in OPTIONAL if name in arrays},
     }
 

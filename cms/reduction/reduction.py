@@ -25,6 +25,12 @@ from cms.reduction.constraint import fixed_interface, fixed_interface_errors
 from cms.reduction.doubt import check_doubtful_digits
 from cms.reduction.model import ReducedModel
 from cms.reduction.residual import residual_flexibility, residual_modes
+from cms.reduction.seen import (
+    NEGLIGIBLE_PARTICIPATION,
+    couples,
+    lowest_seen_modes,
+    told_of_seen,
+)
 from cms.solvers.eigen import (
     SUMMED,
     Modes,
@@ -49,7 +55,6 @@ METHODS = (
     "truncation",
 )
 FIXED = ("craig-bampton", "guyan")
-NEGLIGIBLE_PARTICIPATION = 1e-9
 MASS_ERROR = 1e-7
 LARGEST = 1e-6  # relative difference of entries that both count as a mode's largest
 
@@ -61,6 +66,7 @@ def reduce(
     cutoff_hz: float | None = None,
     method: str = "rubin",
     residual: bool = True,
+    unseen: bool = False,
     progress: Progress | None = None,
 ) -> ReducedModel:
     r"""Reduce a component by component mode synthesis.
@@ -71,8 +77,8 @@ def reduce(
         Any object with ``stiffness``, ``mass`` (N, N) and ``interfaces`` {name: (N,)}; where it has
         a ``damping`` (N, N), too, its projection is the model's ``damping``.
     modes : int, optional
-        Number of component modes to keep, 0 to N; of a floating component the rigid-body modes
-        count. Not for "guyan", which keeps none.
+        Number of component modes to keep, 0 to N: the lowest that an interface or a load vector
+        sees. Of a floating component the rigid-body modes count. Not for "guyan", which keeps none.
     cutoff_hz : float, optional
         Keep the modes up to this frequency in Hz, instead of ``modes``. Below the first
         frequency no mode is kept, which leaves the interfaces' modes alone: a static model.
@@ -91,6 +97,10 @@ def reduce(
         ======================  ============================================================
     residual : bool
         False is short for ``method="truncation"``.
+    unseen : bool
+        Whether modes that no interface sees are kept and counted, too: for matrices beside these
+        that couple modes, as a gyroscopic one. The component's own ``damping`` is looked at: where
+        it couples the modes left out with the others, all are kept.
     progress : callable, optional
         Called as ``progress(text)`` with what is to be done, how much memory it needs, and which
         solver does it.
@@ -155,10 +165,10 @@ def reduce(
     with announced(progress), one_thread():
         check_doubtful_digits(component, pencil)
         try:
-            if method in FIXED:
-                reduced = reduced_fixed(pencil, modes, cutoff_hz, method)
-            else:
-                reduced = reduced_free(pencil, modes, cutoff_hz, method)
+            by_method = reduced_fixed if method in FIXED else reduced_free
+            reduced, left_out = by_method(pencil, modes, cutoff_hz, method, unseen)
+            if couples(getattr(component, "damping", None), reduced.basis, left_out):
+                reduced, _ = by_method(pencil, modes, cutoff_hz, method, True)
         except np.linalg.LinAlgError as error:
             reason = str(error).rstrip(".")
             raise ReductionError(
@@ -167,15 +177,17 @@ def reduce(
             ) from error
     check_masses(pencil, reduced)
     with announced(progress):
-        reduced = with_component_damping(told(reduced, pencil), component)
+        reduced = with_component_damping(told(reduced, pencil, modes), component)
     return replace(reduced, load_vectors=tuple(getattr(component, "load_vectors", ())))
 
 
-def told(reduced: ReducedModel, pencil: Pencil) -> ReducedModel:
+def told(reduced: ReducedModel, pencil: Pencil, asked: int | None) -> ReducedModel:
     """The model with the bound of its rigid-body modes; says that, and which modes are unseen."""
     if reduced.unseen_modes:
         numbers = ", ".join(map(str, reduced.unseen_modes))
         announce(f"kept modes that move no interface: {numbers}")
+    for sentence in told_of_seen(reduced, asked):
+        announce(sentence)
     rigid = reduced.basis[:, reduced.frequencies_hz == 0.0]
     if pencil.digits is None or not rigid.shape[1]:
         return reduced
@@ -211,14 +223,22 @@ def chosen_method(method: str, residual: bool) -> str:
 
 
 def reduced_free(
-    pencil: Pencil, modes: int | None, cutoff_hz: float | None, method: str
-) -> ReducedModel:
-    """Free-interface modes, with what the method adds to them."""
+    pencil: Pencil, modes: int | None, cutoff_hz: float | None, method: str, unseen: bool
+) -> tuple[ReducedModel, FloatArray]:
+    """Free-interface modes with what the method adds to them, and the modes left out (N, k)."""
     shifted = shifted_factor(pencil)
     pencil = without_offsets(pencil, shifted)
     if method != "truncation":
         check_rigid_kept(modes, shifted)
-    kept = kept_modes(pencil, shifted, modes, cutoff_hz)
+    kept, left_out = kept_modes(pencil, shifted, modes, cutoff_hz, unseen, pencil.loads)
+    model = with_residuals(pencil, shifted, kept, cutoff_hz, method)
+    return replace(model, left_out_hz=in_hz(left_out)), left_out.vectors
+
+
+def with_residuals(
+    pencil: Pencil, shifted: Shifted, kept: Modes, cutoff_hz: float | None, method: str
+) -> ReducedModel:
+    """The model of the kept modes and what a free-interface method adds to them."""
     if method == "truncation":
         if kept.squares.size == 0:
             raise ReductionError(nothing_kept(cutoff_hz))
@@ -250,12 +270,13 @@ def reduced_free(
 
 
 def reduced_fixed(
-    pencil: Pencil, modes: int | None, cutoff_hz: float | None, method: str
-) -> ReducedModel:
-    """Constraint modes and fixed-interface modes, projected and diagonalised."""
+    pencil: Pencil, modes: int | None, cutoff_hz: float | None, method: str, unseen: bool
+) -> tuple[ReducedModel, FloatArray]:
+    """Constraint and fixed-interface modes, diagonalised, and the modes left out (N, k)."""
     parts = condensed(pencil)
     if parts is not None:
-        return parts.expanded(reduced_fixed(parts.pencil, modes, cutoff_hz, method))
+        model, out = reduced_fixed(parts.pencil, modes, cutoff_hz, method, unseen)
+        return parts.expanded(model), parts.shapes @ out
     fixed = fixed_interface(pencil)
     inner = fixed.interior
     if modes is not None and modes > inner.size:
@@ -273,12 +294,14 @@ def reduced_fixed(
             "method 'guyan' needs interfaces that hold the component: with them held "
             f"{counted(fixed.shifted.rigid)} are left; use 'craig-bampton'"
         )
-    kept = kept_modes(inner, fixed.shifted, modes, cutoff_hz)
+    pull = fixed.inertia_of_constraint_modes()
+    kept, left_out = kept_modes(inner, fixed.shifted, modes, cutoff_hz, unseen, pull)
     basis = np.hstack([fixed.expanded(kept.vectors), fixed.constraint_modes])
     squares, vectors = ritz(basis, pencil, fastest_square(pencil))
     errors = fixed_interface_errors(fixed, squares, vectors)
     whole = assembled(pencil, Modes(squares, vectors, errors), fixed.dropped, method)
-    return replace(whole, modes=int(kept.squares.size))
+    whole = replace(whole, modes=int(kept.squares.size), left_out_hz=in_hz(left_out))
+    return whole, fixed.expanded(left_out.vectors)
 
 
 def keep_modes(reduced: ReducedModel, numbers: Sequence[int]) -> ReducedModel:
@@ -392,13 +415,26 @@ def nothing_kept(cutoff_hz: float | None) -> str:
 
 
 def kept_modes(
-    pencil: Pencil, shifted: Shifted, modes: int | None, cutoff_hz: float | None
-) -> Modes:
-    """The free-interface modes up to the count or the cut-off frequency."""
+    pencil: Pencil,
+    shifted: Shifted,
+    modes: int | None,
+    cutoff_hz: float | None,
+    unseen: bool,
+    loads: FloatArray,
+) -> tuple[Modes, Modes]:
+    """The modes up to the count or the cut-off frequency, and those that no load moves."""
+    if modes is not None and not unseen:
+        return lowest_seen_modes(pencil, shifted, operator.index(modes), loads)
+    none = Modes(np.zeros(0), np.zeros((pencil.size, 0)), np.zeros(0))
     if modes is not None:
-        return lowest_modes(pencil, shifted, operator.index(modes))
+        return lowest_modes(pencil, shifted, operator.index(modes)), none
     assert cutoff_hz is not None
-    return modes_up_to(pencil, shifted, (2.0 * np.pi * float(cutoff_hz)) ** 2)
+    return modes_up_to(pencil, shifted, (2.0 * np.pi * float(cutoff_hz)) ** 2), none
+
+
+def in_hz(modes: Modes) -> tuple[float, ...]:
+    """The frequencies of modes in Hz."""
+    return tuple((np.sqrt(modes.squares) / (2.0 * np.pi)).tolist())
 
 
 def check_rigid_kept(modes: int | None, shifted: Shifted) -> None:

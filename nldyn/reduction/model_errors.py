@@ -203,9 +203,11 @@ def reductions(
     if method == "guyan":
         return [cms.reduce(component, method=method)]
     if method != "rubin":
-        return [cms.reduce(component, modes=count, method=method) for count in counts]
+        models = [cms.reduce(component, modes=count, method=method) for count in counts]
+        return list({model.modes: model for model in models}.values())
     largest = cms.reduce(component, modes=counts[-1])
-    fewer = [cms.keep_modes(largest, range(1, count + 1)) for count in counts[:-1]]
+    smaller = [count for count in counts if count < largest.modes]
+    fewer = [cms.keep_modes(largest, range(1, count + 1)) for count in smaller]
     return [*fewer, largest]
 
 
@@ -214,7 +216,7 @@ def reference_model(component: cms.ComponentLike, modes: int) -> cms.ReducedMode
     size = int(component.mass.shape[0])
     if size <= ALL_MODES_UP_TO:
         count = most_modes(component, ())
-        return visible_modes(cms.reduce(component, modes=count, method="truncation"))
+        return visible_modes(cms.reduce(component, modes=count, method="truncation", unseen=True))
     return cms.reduce(component, modes=min(max(2 * modes, FEWEST_REFERENCE_MODES), size))
 
 

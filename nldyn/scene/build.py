@@ -15,6 +15,7 @@ from scipy.sparse.linalg import spsolve
 import cms
 import fem
 from cms.reduction.doubt import check_unreduced
+from cms.reduction.seen import told_of_seen
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LARGEST_DENSE, ConvergenceError, SystemModelError
 from nldyn.reduction.candidates import Candidates, candidate_modes
@@ -136,6 +137,7 @@ def build_reduced(
         return selection.reduced
     pieces = 1 if isinstance(component, cms.Matrices) else fem.pieces_of(component.model).count
     hint = f"; the mesh is in {pieces} pieces that share no node" if pieces > 1 else ""
+    coupled = scene.matrices is not None and scene.matrices.has_skew
     with told_as(scene, ("reduction",), cms.ReductionError, hint=hint):
         reduced = cms.reduce(
             component,
@@ -143,15 +145,18 @@ def build_reduced(
             cutoff_hz=table.cutoff_hz,
             method=table.method,
             residual=table.residual,
+            unseen=coupled,
             progress=logger.info if component.mass.shape[0] > LARGE else None,
         )
         if pieces > 1 and reduced.rigid_body_modes:
             count = reduced.rigid_body_modes
             modes = f"{count} rigid-body mode{'s' if count > 1 else ''}"
             raise cms.ReductionError(f"the component floats ({modes})")
-        if reduced.unseen_modes:
+        if reduced.unseen_modes and not coupled:
             numbers = ", ".join(map(str, reduced.unseen_modes))
             logger.info(f"kept modes that no interface can see: {numbers}; they change nothing")
+        for sentence in told_of_seen(reduced, table.modes):
+            logger.info(sentence)
         return reduced
 
 
@@ -160,7 +165,7 @@ def _unreduced_model(scene: Scene, component: AnyComponent) -> cms.ReducedModel:
     rows = component.mass.shape[0]
     _check_small(scene, rows)
     with told_as(scene, ("matrices",), cms.ReductionError):
-        return cms.reduce(component, modes=rows)
+        return cms.reduce(component, modes=rows, unseen=True)
 
 
 def _check_small(scene: Scene, rows: int) -> None:

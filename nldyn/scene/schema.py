@@ -377,7 +377,8 @@ class ReductionTable(Table):
     """``[reduction]``: which modes of the mesh's model are kept."""
 
     modes: Annotated[int, Field(ge=0)] | None = None
-    """Number of free-interface modes, lowest first."""
+    """Number of free-interface modes that an interface or a load vector sees, lowest first. Those
+    that none sees do not move: they are left out and told."""
     cutoff_hz: Frequency | None = None
     """[Hz] Keep the modes up to this frequency."""
     tolerance: Annotated[float, Field(ge=1e-6, lt=1.0)] | None = None
@@ -507,6 +508,11 @@ class MatricesTable(Table):
     of this vector with the coordinates."""
     loads: dict[str, VectorOrPlace] = {}
     """[kg] `loads.NAME = ...`: load vector M r of a weight or a moving base along r."""
+
+    @property
+    def has_skew(self) -> bool:
+        """Whether a gyroscopic or a circulatory matrix couples what mass and stiffness do not."""
+        return any(one is not None for one in (self.gyroscopic, self.circulatory, self.spin))
 
 
 class DampingTable(Table):

@@ -316,7 +316,8 @@ class System:
             As for `from_modal`; interfaces that are `load_vectors` of the reduced model are loads,
             too.
         gyroscopic, circulatory : (n, n) array_like, optional
-            Skew matrices ``basis.T @ G @ basis`` in 1/s and 1/s², as for `from_matrices`.
+            Skew matrices ``basis.T @ G @ basis`` in 1/s and 1/s², as for `from_matrices`; the
+            model must be one that keeps modes which no interface sees (``unseen=True``).
         spin : Spin, optional
             As for `from_matrices`, with matrices on the same basis.
 
@@ -325,7 +326,8 @@ class System:
         SystemModelError
             If it is no reduced model, or part of its flexibility has no mass
             (`residual_flexibility`), as by MacNeal's method: its interfaces would move at once
-            under a force. See also `System`.
+            under a force; or if modes are left out that a skew matrix may couple. See also
+            `System`.
         """
         if not (hasattr(reduced, "frequencies_hz") and hasattr(reduced, "participation")):
             raise SystemModelError(
@@ -338,6 +340,12 @@ class System:
                 "part of the reduced model's flexibility has no mass "
                 f"(method '{getattr(reduced, 'method', 'unknown')}'), so that its interfaces have "
                 "no equation of motion; reduce by 'rubin' or 'craig-bampton' instead"
+            )
+        given = (gyroscopic, circulatory, spin)
+        if getattr(reduced, "left_out_hz", ()) and any(one is not None for one in given):
+            raise SystemModelError(
+                "the reduced model leaves out modes that no interface sees, but which a gyroscopic "
+                "or a circulatory matrix may couple with the others; reduce with unseen=True"
             )
         whole = set(getattr(reduced, "load_vectors", ()))
         rows = reduced.participation

@@ -185,7 +185,7 @@ def test_a_loose_piece_moves_rigidly_beside_a_held_one(modes):
             interfaces={name: fem.Interface("tip", name) for name in ("x", "y")},
         )
     )
-    reduced = cms.reduce(component, modes=modes, method="craig-bampton")
+    reduced = cms.reduce(component, modes=modes, method="craig-bampton", unseen=True)
     assert np.array_equal(reduced.frequencies_hz[:3], np.zeros(3))
     K, M = component.stiffness.toarray(), component.mass.toarray()
     exact = np.sqrt(linalg.eigh(K, M, eigvals_only=True)[3:]) / (2.0 * np.pi)

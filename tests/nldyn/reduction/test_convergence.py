@@ -224,11 +224,11 @@ def small():
 
 
 def test_where_all_modes_are_kept_the_report_says_that_nothing_is_left_out(small):
-    """Against the orbit of the full model, found on its own."""
+    """Against the orbit of the full model, found on its own; the residual mode is the fourth."""
     assert [small.is_exact(model) for model in small.models] == [False, True, True, True]
     assert all(error.force < 1e-9 and error.contact < 1e-9 for error in small.errors[1:])
     said = small.report()
-    assert "rubin with 6 modes leaves nothing out: the interfaces see no other modes" in said
+    assert "rubin with 3 modes leaves nothing out: the interfaces see no other modes" in said
     assert "rubin, peak height: 1 % from 3 modes, 0.01 % from 3 modes" in said
     assert not re.search(r"\binf\b|not reached|\bref\b", said)
 
@@ -368,10 +368,11 @@ def test_solids_are_refined_in_the_mesher():
 
 
 def test_the_counts_that_are_not_given_fit_the_model():
-    """Three masses on a string, the last of which may be nothing."""
+    """Three masses on a string, the last maybe nothing; of equal ones a mode is unseen."""
     K = 1e5 * (2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1))
     for masses, methods, counts in (
-        ([1.0, 1.0, 1.0], ("rubin",), {1, 2, 3}),
+        ([1.0, 1.0, 2.0], ("rubin",), {1, 2, 3}),
+        ([1.0, 1.0, 1.0], ("rubin",), {1, 2}),
         ([1.0, 1.0, 1.0], ("craig-bampton",), {1, 2}),
         ([1.0, 1.0, 0.0], ("rubin",), {1, 2}),
     ):

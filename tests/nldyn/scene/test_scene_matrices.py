@@ -249,3 +249,25 @@ def test_matrices_that_float_but_for_their_digits(tmp_path):
         known = np.sqrt(np.linalg.eigvalsh(exact)[1:4]) / (2 * np.pi)
         assert hz[0] == 0.0
         np.testing.assert_allclose(hz[1:4], known, rtol=10.0 ** (1 - digits))
+
+
+TWO_PLANES = """
+matrices = {mass = [[1, 0], [0, 1]], stiffness = [[4, 0], [0, 9]], interfaces.y = [0, 1]}
+reduction.modes = 1
+"""
+
+
+def test_a_scene_counts_the_modes_that_an_interface_sees(caplog):
+    with caplog.at_level("INFO", logger="nldyn"):
+        system = build_system(parse_scene(TWO_PLANES, "scene.toml"))
+    assert system.natural_frequencies == pytest.approx([3.0], rel=1e-14)
+    assert "1 mode that no interface sees is left out: 0.3183 Hz" in caplog.text
+
+
+def test_modes_that_a_gyroscopic_matrix_couples_are_seen():
+    """λ² + s = 0 with (4 - s)(9 - s) = s."""
+    turned = TWO_PLANES.replace("stiffness", "gyroscopic = [[0, 1], [-1, 0]], stiffness")
+    scene = parse_scene(turned.replace("modes = 1", "modes = 2"), "scene.toml")
+    rates = np.linalg.eigvals(build_system(scene).linear.blocks).ravel()
+    exact = np.sqrt(7.0 + np.sqrt(13.0) * np.array([-1.0, 1.0]))
+    assert np.unique(abs(rates.imag).round(12)) == pytest.approx(exact, rel=1e-11)
