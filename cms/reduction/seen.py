@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import linalg
 
 from cms.base.arrays import FloatArray
 from cms.base.errors import ReductionError
@@ -15,6 +16,8 @@ from cms.reduction.model import ReducedModel
 from cms.solvers.eigen import DENSE_AT_MOST, Modes, Shifted, lowest_modes
 
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+ONE_FREQUENCY = 1e-9  # relative difference of squares that are the same but for rounding
 NEGLIGIBLE_PARTICIPATION = 1e-9
 NEGLIGIBLE_COUPLING = 1e-9
 MOST_LISTED = 12
@@ -25,20 +28,27 @@ def lowest_seen_modes(
 ) -> tuple[Modes, Modes]:
     """The ``count`` lowest modes that some load moves, and those below that none does.
 
-    Fewer where the component has no more. Rigid-body modes are among the first ones always.
+    Fewer where the component has no more. Rigid-body modes are among the first ones always. Modes
+    of one frequency are told apart by the loads, see `turned`.
 
     Raises
     ------
     ReductionError
         As `lowest_modes`, and if a large component has too few among a quarter of its modes.
     """
+    if not count or not loads.shape[1]:
+        modes = lowest_modes(pencil, shifted, count)
+        return modes, chosen(modes, np.zeros(count, dtype=bool))
     most = pencil.size - pencil.massless.shape[1]
     limit = most if pencil.size <= DENSE_AT_MOST else pencil.size // 4
-    asked = count
+    asked = max(count, min(count + 1, limit))
     while True:
         modes = lowest_modes(pencil, shifted, asked)
+        groups = of_one_frequency(modes)
+        modes = turned(modes, groups, loads)
         seen = moved(modes, loads)
-        found = int(np.count_nonzero(seen))
+        whole = (groups < groups[-1]) | (asked >= limit)  # the last may have more modes
+        found = int(np.count_nonzero(seen & whole))
         if found >= count or asked >= limit:
             break
         asked = min(2 * asked, limit)
@@ -51,10 +61,35 @@ def lowest_seen_modes(
     return chosen(modes, seen & (rank <= count)), chosen(modes, ~seen & (rank < count))
 
 
+def of_one_frequency(modes: Modes) -> IntArray:
+    """A number for each mode (k,), the same for modes that only their errors tell apart."""
+    doubt = np.maximum(ONE_FREQUENCY, modes.errors[1:] + modes.errors[:-1])
+    apart = np.diff(modes.squares) > doubt * modes.squares[1:]
+    return np.concatenate([[0], np.cumsum(apart)])
+
+
+def turned(modes: Modes, groups: IntArray, loads: FloatArray) -> Modes:
+    """The modes with those of one frequency turned among each other.
+
+    The first of them is the one that the loads (N, m), scaled to one, move most; so only as many
+    are moved as there are independent loads. Rigid-body modes stay.
+    """
+    forces = loads.T @ modes.vectors / np.linalg.norm(loads, axis=0)[:, None]
+    squares, vectors, errors = modes.squares.copy(), modes.vectors.copy(), modes.errors.copy()
+    for group in np.flatnonzero(np.bincount(groups) > 1):
+        same = np.flatnonzero(groups == group)
+        if squares[same[0]] == 0.0:
+            continue
+        _, _, turn = linalg.svd(forces[:, same])
+        vectors[:, same] = vectors[:, same] @ turn.T
+        spread = np.ptp(squares[same]) / squares[same[0]]
+        squares[same] = turn**2 @ squares[same]
+        errors[same] = np.max(errors[same]) + spread
+    return Modes(squares, vectors, errors)
+
+
 def moved(modes: Modes, loads: FloatArray) -> BoolArray:
     """Whether some load (N, m) moves each mode, (k,); rigid-body modes count as moved."""
-    if not loads.shape[1]:
-        return np.ones(modes.squares.shape, dtype=bool)
     share = np.abs(loads.T @ modes.vectors)
     size = np.linalg.norm(loads, axis=0)[:, None] * np.linalg.norm(modes.vectors, axis=0)
     seen: BoolArray = np.any(share > NEGLIGIBLE_PARTICIPATION * size, axis=0)

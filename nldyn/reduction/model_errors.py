@@ -216,7 +216,7 @@ def reference_model(component: cms.ComponentLike, modes: int) -> cms.ReducedMode
     size = int(component.mass.shape[0])
     if size <= ALL_MODES_UP_TO:
         count = most_modes(component, ())
-        return visible_modes(cms.reduce(component, modes=count, method="truncation", unseen=True))
+        return visible_modes(cms.reduce(component, modes=count, method="truncation"))
     return cms.reduce(component, modes=min(max(2 * modes, FEWEST_REFERENCE_MODES), size))
 
 

@@ -23,7 +23,11 @@ def in_plane_hz(side):
 @pytest.fixture(scope="module")
 def beam():
     """A cantilever in space whose tip is seen along y alone, and the same in its plane."""
-    part = fem.BeamPart(STEEL, fem.RectangularSection(WIDTH, HEIGHT))
+    return cantilevers(WIDTH)
+
+
+def cantilevers(width):
+    part = fem.BeamPart(STEEL, fem.RectangularSection(width, HEIGHT))
     line = fem.frame_mesh({"root": (0, 0), "tip": (LENGTH, 0)}, [("beam", "root", "tip", COUNT)])
     flat = fem.FrameModel(
         line,
@@ -80,6 +84,19 @@ def test_the_band_of_the_error_holds_where_modes_are_left_out(beam, method):
         error = b @ np.linalg.solve(dynamic, b) - reduced.receptance(hz, "tip", "tip").real
         rounding = 1e-9 * abs(reduced.receptance(hz, "tip", "tip"))
         assert low - rounding <= error <= high + rounding
+
+
+@pytest.mark.parametrize("modes", [1, 4])
+def test_of_two_modes_of_one_frequency_the_interface_sees_one(modes):
+    """A square section: any turn of the two planes is a pair of modes."""
+    whole, flat = cantilevers(HEIGHT)
+    reduced, expected = cms.reduce(whole, modes=modes), cms.reduce(flat, modes=modes)
+    np.testing.assert_allclose(reduced.frequencies_hz, expected.frequencies_hz, rtol=1e-8)
+    assert reduced.participation["tip"] == pytest.approx(expected.participation["tip"], rel=1e-6)
+    np.testing.assert_allclose(reduced.left_out_hz, in_plane_hz(HEIGHT)[: modes - 1], rtol=1e-4)
+    low, high = cms.accuracy(whole, reduced).receptance_error(10.0, "tip", "tip")[0]
+    error = cms.accuracy(flat, expected).receptance_error(10.0, "tip", "tip")[0]
+    assert [low, high] == pytest.approx(error, rel=1e-5)
 
 
 def springs(**more):
