@@ -373,7 +373,8 @@ def test_the_counts_that_are_not_given_fit_the_model():
     for masses, methods, counts in (
         ([1.0, 1.0, 2.0], ("rubin",), {1, 2, 3}),
         ([1.0, 1.0, 1.0], ("rubin",), {1, 2}),
-        ([1.0, 1.0, 1.0], ("craig-bampton",), {1, 2}),
+        ([1.0, 1.0, 2.0], ("craig-bampton",), {1, 2}),
+        ([1.0, 1.0, 1.0], ("craig-bampton",), {1}),
         ([1.0, 1.0, 0.0], ("rubin",), {1, 2}),
     ):
         chain = cms.Matrices(K, np.diag(masses), {"middle": np.eye(3)[1]})
