@@ -33,6 +33,7 @@ from nldyn.app.options import (
     mesh_option,
     number_list,
     out_option,
+    plane_state,
     quiet_option,
     replace_option,
     scene_argument,
@@ -43,6 +44,7 @@ from nldyn.report.console import kept_at_interrupt, plain_errors, told_what_is_k
 from nldyn.runtime.interruption import STOPPED, interrupted
 
 if TYPE_CHECKING:
+    from nldyn.longterm.basins import PlaneState
     from nldyn.scene.build import Structure
     from nldyn.scene.schema import Scene
 
@@ -603,6 +605,97 @@ def simulate(
         if told is not None:
             click.echo(repr(told).strip("<>"))
     click.echo(f"written to {out}: {written_by(out, 'simulation')}")
+
+
+@main.command()
+@scene_argument
+@out_option
+@mesh_option
+@replace_option
+@click.option(
+    "--frequency-hz",
+    type=click.FloatRange(1e-6, 1e12),
+    required=True,
+    metavar="HZ",
+    help="Excitation frequency.",
+)
+@click.option(
+    "--x",
+    callback=plane_state,
+    metavar="STATE:INTERFACE",
+    help="What is on the horizontal axis, such as displacement:tip or velocity:tip; by default the "
+    "displacement of the interface of the first stop, or of the first one.",
+)
+@click.option(
+    "--y",
+    callback=plane_state,
+    metavar="STATE:INTERFACE",
+    help="What is on the vertical axis; by default the velocity there.",
+)
+@click.option(
+    "--x-range",
+    nargs=2,
+    type=float,
+    metavar="MIN MAX",
+    help="Its range in m or m/s; by default twice what the attractors do.",
+)
+@click.option("--y-range", nargs=2, type=float, metavar="MIN MAX", help="Likewise.")
+@click.option(
+    "--cells",
+    type=click.IntRange(2, 3000),
+    default=50,
+    show_default=True,
+    metavar="N",
+    help="Initial states along each axis.",
+)
+@click.option(
+    "--longest",
+    type=click.IntRange(64, 10_000_000),
+    default=2000,
+    show_default=True,
+    metavar="N",
+    help="Excitation periods after which a motion counts as undecided.",
+)
+@quiet_option
+@jobs_option
+def basins(
+    scene: Path,
+    out: Path,
+    mesh_folders: tuple[Path, ...],
+    replace: bool,
+    frequency_hz: float,
+    x: PlaneState | None,
+    y: PlaneState | None,
+    x_range: tuple[float, float] | None,
+    y_range: tuple[float, float] | None,
+    cells: int,
+    longest: int,
+    quiet: bool,
+    jobs: int,
+) -> None:
+    """Find which initial states of a scene lead to which attractor, in a plane of two of them.
+
+    All else begins undeformed, at forcing phase zero. Writes attractors.csv, with the share of
+    each, basins.csv, each state with the number of its attractor (0 undecided, -1 behind a rigid
+    stop), and a picture.
+    """
+    with plain_errors():
+        from nldyn.runtime.progress import progress_line
+        from nldyn.scene.read import load_scene
+
+        loaded = load_scene(scene, mesh_folders)
+        check_results(out, loaded, replace)
+        from nldyn.report.basins import write_basins
+        from nldyn.scene.basins import basins_of
+
+        with progress_line(quiet) as report:
+            found = basins_of(
+                loaded, frequency_hz, x=x, y=y, x_range=x_range, y_range=y_range, cells=cells,
+                longest=longest, progress=report, jobs=jobs,
+            )  # fmt: skip
+        write_basins(found, out, loaded.text, loaded.title)
+    click.echo(f"{repr(found).strip('<>')}\n{found.report()}")
+    click.echo(f"written to {out}: {written_by(out, 'basins')}")
 
 
 def written_by(out: Path, kind: str) -> str:

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from nldyn.longterm.basins import PlaneState
 
 
 def usable_cores() -> int:
@@ -63,6 +67,20 @@ def number_list(
             raise click.BadParameter(f"'{value}' names more than 1000 numbers")
         found |= set(range(int(first), int(last or first) + 1))
     return sorted(found)
+
+
+def plane_state(
+    _context: click.Context, _parameter: click.Parameter, value: str | None
+) -> PlaneState | None:
+    """Read what is on an axis, such as displacement:tip."""
+    if value is None:
+        return None
+    quantity, _, name = value.partition(":")
+    if quantity not in ("displacement", "velocity") or not name:
+        raise click.BadParameter(
+            f"'{value}' is neither displacement:INTERFACE nor velocity:INTERFACE"
+        )
+    return quantity, name
 
 
 json_option = click.option(

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
-from nldyn.flow.flow_map import Trajectory
+from nldyn.flow.flow_map import FlowMap, Trajectory
 from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.stop import Stop
 
 SHUT = 1e-13  # of the displacements that add up to that at a stop: a gap counts as closed
+BEHIND = 1e-9  # of them: depth of a state that lies behind a rigid stop
 STILL = 1e-9  # of the largest speed at a stop: one that counts as none
 
 
@@ -38,6 +39,16 @@ class RigidImpacts(NamedTuple):
     def impulse(self, mobility: float) -> Real:
         """Impulses (k,) in N s, by the mobility of the stop in 1/kg."""
         return (self.speed + self.rebound) / mobility
+
+
+def behind_rigid_stops(flow: FlowMap, states: Real) -> NDArray[np.bool_]:
+    """Which of the states z (k, 2n) lie behind a rigid stop, where no motion can begin."""
+    behind = np.zeros(len(states), dtype=bool)
+    for row, stop in zip(flow.rows, flow.system.stops, strict=False):
+        if isinstance(stop, RigidStop):
+            size = np.abs(states) @ np.abs(row) + stop.gap
+            behind |= states @ row - stop.gap > BEHIND * size
+    return behind
 
 
 def states_before(motion: Trajectory, pieces: NDArray[np.intp]) -> Real:

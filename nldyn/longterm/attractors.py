@@ -22,6 +22,7 @@ from nldyn.base.errors import (
     numbers,
 )
 from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.longterm.impacts import impacts
 from nldyn.longterm.lyapunov import LyapunovSpectrum, spectrum_from
 from nldyn.longterm.simulation import (
     MOST_PERIODS,
@@ -52,6 +53,7 @@ MOST_CONFIRMATIONS = 10**4
 MOST_AVERAGED = 10**7  # periods of a first run
 LONGEST = 8  # a motion that has not decided itself is followed this much longer
 STILL = 0.1  # of `ON_ORBIT`: a run that moves less lies on its orbit
+RECORDED = 64  # periods of a motion on an attractor
 NEARER = 0.9  # of its distance from an orbit, to which a motion must come that may approach it
 SLOWEST = 1e-12  # decay per period that is waited for
 MOST = 0.9  # share of a cloud's points with a neighbour within what counts as near
@@ -161,6 +163,29 @@ class Attractor:
         return f"period {self.period}" if self.orbit is not None else self.kind
 
     @property
+    def lasting(self) -> bool:
+        """Whether it is one: not a motion that has yet to settle, never does, or failed."""
+        return self.kind not in ("failed", "undecided", "drifting")
+
+    @property
+    def impact_rate(self) -> float:
+        """Impacts in an excitation period, over all stops."""
+        if self.orbit is not None:
+            return self.orbit.impacts / self.period
+        return len(impacts(self.motion())) / RECORDED if self.lasting else math.nan
+
+    @property
+    def title(self) -> str:
+        """Such as ``period 3, 2 impacts`` or ``chaotic, 0.81 impacts per period``."""
+        if self.orbit is not None:
+            count = self.orbit.impacts
+            return f"{self.name}, {count or 'no'} impact{'' if count == 1 else 's'}"
+        if not self.lasting:
+            return self.name
+        rate = self.impact_rate
+        return f"{self.name}, {rate:.2g} impacts per period" if rate else f"{self.name}, no impacts"
+
+    @property
     def largest_exponent(self) -> tuple[float, float]:
         """Largest Lyapunov exponent and its standard error in 1/s.
 
@@ -234,7 +259,7 @@ class Attractor:
         lasting = "chaotic before, too" if self.kind == "chaotic" else "a chaotic transient before"
         return f"; {lasting}: {values}"
 
-    def motion(self, periods: int = 64) -> Motion:
+    def motion(self, periods: int = RECORDED) -> Motion:
         """The motion on the attractor, recorded over some excitation periods."""
         check_whole("periods", periods, 1, MOST_RECORDED)
         if periods not in self._cache:

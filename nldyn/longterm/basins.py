@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from nldyn.base.arrays import SLACK, TINY, Real
 from nldyn.base.errors import (
     SystemModelError,
+    check_choice,
     check_frequency,
     check_types,
     check_whole,
@@ -25,6 +26,7 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.flow.rigid import behind_rigid_stops
 from nldyn.longterm.attractors import (
     Attractor,
     AttractorOptions,
@@ -41,6 +43,12 @@ from nldyn.system.system import System, same_system
 CELLS = 250  # initial states in one computation
 MOTION = 10  # cells that take as long as a motion that is looked at closely
 MOST_CELLS = 10**7
+IMPOSSIBLE = -2  # label of a state behind a rigid stop
+PARALLEL = 1e-9  # what is left of one of two directions across the other
+AROUND = 2.0  # size of a plane, over that of what attractors do in it
+SAMPLES = 4096  # of a motion whose size is wanted
+PlaneState = tuple[str, str]  # "displacement" or "velocity", and of which interface
+UNITS = {"displacement": "m", "velocity": "m/s"}
 IN_PLANE = 1e-6  # of a state: its distance from a plane in which it lies
 
 
@@ -135,21 +143,114 @@ class StatePlane:
         for label, ends in (("displacement", displacement), ("velocity", velocity)):
             check_types(**{f"plane: {label}": (ends, Sequence, np.ndarray)})
         name = check_observe(system, interface)
-        phi = system.participation[name]
-        if name in system.rides:
-            raise SystemModelError(f"plane: '{name}' rides on a base; take the relative motion")
-        if not np.any(phi):
-            raise SystemModelError(f"no mode moves interface '{name}'")
-        along = phi / float(phi @ phi)
+        x, y = ("displacement", name), ("velocity", name)
+        return cls.spanned_by(system, x, y, displacement, velocity, origin=origin)
+
+    @classmethod
+    def spanned_by(
+        cls,
+        system: System,
+        x: PlaneState,
+        y: PlaneState,
+        x_range: tuple[float, float],
+        y_range: tuple[float, float],
+        *,
+        origin: Real | None = None,
+    ) -> StatePlane:
+        """Any two of the displacements (m) and velocities (m/s) of interfaces.
+
+        Of all states with these two numbers it is the one nearest to `origin`.
+
+        Parameters
+        ----------
+        system : System
+            The system.
+        x, y : ({"displacement", "velocity"}, str)
+            What is on either axis, of which interface.
+        x_range, y_range : (float, float)
+            Their ranges.
+        origin : (2n,) array, optional
+            As for `at_interface`.
+
+        Raises
+        ------
+        SystemModelError
+            For input that makes no sense, such as two interfaces that always move together.
+
+        Examples
+        --------
+        >>> system = System.from_matrices(np.eye(2), [[2.0, -1.0], [-1.0, 2.0]],
+        ...     {"a": [1.0, 0.0], "b": [0.0, 1.0]})
+        >>> StatePlane.spanned_by(
+        ...     system, ("displacement", "a"), ("displacement", "b"), (-1.0, 1.0), (-2.0, 2.0))
+        <StatePlane: displacement of a (m) -1 to 1, displacement of b (m) -2 to 2>
+        """
+        rows = _rows_of(system, x, y)
         n = system.size
         base = np.zeros(2 * n) if origin is None else numbers("origin", origin)
         if base.shape != (2 * n,):
             raise SystemModelError(f"origin must have {2 * n} entries, got shape {base.shape}")
-        x = np.concatenate([along, np.zeros(n)])
-        y = np.concatenate([np.zeros(n), along])
-        base = base - x * float(phi @ base[:n]) - y * float(phi @ base[n:])
-        labels = (f"displacement of {name} (m)", f"velocity of {name} (m/s)")
-        return cls(base, x, y, displacement, velocity, *labels)
+        sizes = np.linalg.norm(rows, axis=1)
+        unit = rows / sizes[:, None]
+        if abs(1.0 - abs(float(unit[0] @ unit[1]))) < PARALLEL:
+            raise SystemModelError(f"plane: the {x[0]} of '{x[1]}' moves with that of '{y[1]}'")
+        along = np.linalg.solve(unit @ unit.T, unit) / sizes[:, None]
+        base = base - (rows @ base) @ along
+        labels = [f"{quantity} of {name} ({UNITS[quantity]})" for quantity, name in (x, y)]
+        return cls(base, along[0], along[1], x_range, y_range, *labels)
+
+    @classmethod
+    def around(
+        cls,
+        attractors: Sequence[Attractor],
+        x: PlaneState,
+        y: PlaneState,
+        *,
+        x_range: tuple[float, float] | None = None,
+        y_range: tuple[float, float] | None = None,
+    ) -> StatePlane:
+        """A plane `spanned_by` two states, twice as wide as what some attractors do in it.
+
+        Parameters
+        ----------
+        attractors : sequence of Attractor
+            At least one, all of one system and frequency.
+        x, y : ({"displacement", "velocity"}, str)
+            What is on either axis, of which interface.
+        x_range, y_range : (float, float), optional
+            A range that is known.
+
+        Raises
+        ------
+        SystemModelError
+            For input that makes no sense, and if the attractors do not move.
+
+        Examples
+        --------
+        >>> from nldyn import HarmonicForce, System, classify_attractor
+        >>> system = System.from_matrices([[1.0]], [[1.0]], {"x": [1.0]}, damping=[[1.0]],
+        ...     excitation=[HarmonicForce("x", 1.0)])
+        >>> found = classify_attractor(system, 0.5 / np.pi)     # resonance, amplitude 1 m
+        >>> StatePlane.around([found], ("displacement", "x"), ("velocity", "x"))
+        <StatePlane: displacement of x (m) -2 to 2, velocity of x (m/s) -2 to 2>
+        """
+        if not attractors:
+            raise SystemModelError("plane: no attractor is known, so the ranges must be given")
+        system = attractors[0].flow.system
+        rows = _rows_of(system, x, y)
+        states = np.vstack([_all_along(attractor) for attractor in attractors])
+        low, high = (rows @ states.T).min(axis=1), (rows @ states.T).max(axis=1)
+        middle, half = 0.5 * (low + high), 0.5 * AROUND * (high - low)
+        rate = 2.0 * math.pi * attractors[0].frequency_hz
+        half = np.where(half > TINY, half, _other_size(half, x, y, rate))
+        ranges = []
+        for given, centre, size in zip((x_range, y_range), middle, half, strict=True):
+            if given is None and not size > 0.0:
+                raise SystemModelError(
+                    f"plane: no attractor moves '{x[1]}' or '{y[1]}', so the ranges must be given"
+                )
+            ranges.append(given or (float(centre - size), float(centre + size)))
+        return cls.spanned_by(system, x, y, ranges[0], ranges[1])
 
     def axes(self, shape: tuple[int, int]) -> tuple[Real, Real]:
         """Coordinates of the middles of the cells, (nx,) and (ny,), for a shape (ny, nx)."""
@@ -180,6 +281,37 @@ class StatePlane:
         return found.T / unit, off <= IN_PLANE * np.maximum(size, TINY)
 
 
+def _rows_of(system: System, x: PlaneState, y: PlaneState) -> Real:
+    """Rows (2, 2n) that give two states of interfaces from a modal one."""
+    zero = np.zeros(system.size)
+    rows = []
+    for axis, state in (("x", x), ("y", y)):
+        check_types(**{f"plane: {axis}": (state, Sequence)})
+        if len(state) != 2:
+            raise SystemModelError(f"plane: {axis} must be a state and an interface, got {state}")
+        quantity, name = state
+        check_choice(f"plane: {axis}", quantity, UNITS)
+        phi = system.participation[check_observe(system, name)]
+        if name in system.rides:
+            raise SystemModelError(f"plane: '{name}' rides on a base; take the relative motion")
+        if not np.any(phi):
+            raise SystemModelError(f"no mode moves interface '{name}'")
+        rows.append(np.concatenate([phi, zero] if quantity == "displacement" else [zero, phi]))
+    return np.array(rows)
+
+
+def _all_along(attractor: Attractor) -> Real:
+    """Modal states (k, 2n) along the motion on an attractor."""
+    motion = attractor.motion()
+    return motion.states(np.linspace(motion.start_time, motion.end_time, SAMPLES))
+
+
+def _other_size(half: Real, x: PlaneState, y: PlaneState, rate: float) -> Real:
+    """Sizes (2,) of axes by that of the other one, at a rate in rad/s."""
+    power = [0 if quantity == "displacement" else 1 for quantity, _ in (x, y)]
+    return half[::-1] * rate ** np.array([power[0] - power[1], power[1] - power[0]])
+
+
 @dataclass(frozen=True, eq=False)
 class Basin:
     """One attractor's part of the plane.
@@ -189,7 +321,11 @@ class Basin:
     attractor : Attractor
         The attractor.
     share : float
-        Share of the cells.
+        Share of the cells; of those that are no possible states none counts.
+    uncertainty : float
+        Of the share, by the size of the cells: the larger of half the cells at the basin's edge,
+        which may lie anywhere between the middles of two cells, and the standard error of a count
+        of as many random states [Agresti and Coull].
     integrity : float
         Radius of the largest disc within it, in units of the sides of the rectangle: the integrity
         factor of Rega and Lenci. The edge of the rectangle counts as a boundary.
@@ -200,8 +336,19 @@ class Basin:
 
     attractor: Attractor
     share: float
+    uncertainty: float
     integrity: float
     distance: float
+
+    def __repr__(self) -> str:
+        """One line: the attractor and its share."""
+        return f"<Basin: {self.text}>"
+
+    @property
+    def text(self) -> str:
+        """Such as ``period 2, 1 impact: 40.0 ± 0.5 %``."""
+        percent = f"{100.0 * self.share:.1f} ± {100.0 * self.uncertainty:.1f} %"
+        return f"{self.attractor.title}: {percent}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +364,8 @@ class Basins:
     attractors : tuple of Attractor
         Those that were reached.
     labels : (ny, nx) int
-        Index of the attractor, or -1 where the motion did not settle in time or failed.
+        Index of the attractor, -1 where the motion did not settle in time or failed, or -2 where
+        the state lies behind a rigid stop, so that no motion begins there.
     phases : (ny, nx) int
         Of a subharmonic of period n, by how many excitation periods, 0 to n - 1, the motion runs
         ahead of the attractor's first state; else 0.
@@ -251,7 +399,12 @@ class Basins:
     @property
     def undecided(self) -> float:
         """Share of the cells that led to no attractor in time."""
-        return float(np.mean(self.labels == UNDECIDED))
+        return float(np.mean(self.labels[self.possible] == UNDECIDED))
+
+    @property
+    def possible(self) -> NDArray[np.bool_]:
+        """Which of the cells (ny, nx) are states that do not lie behind a rigid stop."""
+        return np.asarray(self.labels != IMPOSSIBLE)
 
     @property
     def basins(self) -> tuple[Basin, ...]:
@@ -264,10 +417,33 @@ class Basins:
         depth = np.asarray(distance_transform_edt(np.pad(inside, 1), sampling=(1.0 / ny, 1.0 / nx)))
         return Basin(
             self.attractors[index],
-            float(inside.mean()),
+            float(inside[self.possible].mean()),
+            self._uncertainty(inside),
             float(depth.max()),
             self._distance(index, inside),
         )
+
+    def _uncertainty(self, inside: NDArray[np.bool_]) -> float:
+        """Of the share of some cells."""
+        possible = self.possible
+        padded = np.pad(inside | ~possible, 1, constant_values=True)
+        around = (padded[:-2, 1:-1], padded[2:, 1:-1], padded[1:-1, :-2], padded[1:-1, 2:])
+        edge = inside & ~np.logical_and.reduce(around)
+        count = int(possible.sum()) + 4
+        share = (int(inside.sum()) + 2) / count
+        statistical = math.sqrt(share * (1.0 - share) / count)
+        return max(0.5 * float(edge[possible].mean()), statistical)
+
+    def report(self) -> str:
+        """Lines for a reader: each attractor with its share, what was undecided, what failed."""
+        lines = [basin.text for basin in self.basins]
+        if self.undecided:
+            lines.append(f"undecided: {100.0 * self.undecided:.1f} %")
+        if not self.possible.all():
+            behind = 100.0 * (1.0 - float(self.possible.mean()))
+            lines.append(f"{behind:.1f} % of the plane lies behind a rigid stop and does not count")
+        again = f"{self.wrong} of {self.checked} cells that were simulated once more"
+        return "\n".join([*lines, f"{again} came to another result", *self.notes])
 
     def points(self, index: int) -> Real:
         """Coordinates (k, 2) of an attractor's stroboscopic states in the plane."""
@@ -366,6 +542,9 @@ def basins(
 
     References
     ----------
+    A. Agresti, B. A. Coull (1998), Approximate is better than "exact" for interval estimation of
+    binomial proportions, *Am. Stat.* 52.
+
     G. Rega, S. Lenci (2005), Identifying, evaluating, and controlling dynamical integrity measures
     in non-linear mechanical oscillators, *Nonlinear Anal.* 63.
     """
@@ -375,11 +554,8 @@ def basins(
         attractors=(attractors, Sequence),
     )  # fmt: skip
     check_execution(executor, progress)
-    check_frequency("frequency_hz", frequency_hz)
+    check_has_basins(flow, frequency_hz)
     omega = 2.0 * math.pi * frequency_hz
-    check_bounded(flow, omega)
-    if flow.system.conservative:
-        raise SystemModelError("basins: a system without damping has no attractors")
     name = check_observe(flow.system, observe)
     options = options or AttractorOptions()
     for label, value, least in (
@@ -394,10 +570,15 @@ def basins(
         )
     _check_known(attractors, flow.system, frequency_hz)
     modal = plane.states(shape).reshape(-1, plane.origin.size)
+    ends = _Ends.of(flow.to_state(modal))
+    ends.labels[behind_rigid_stops(flow, ends.states)] = IMPOSSIBLE
+    possible = np.flatnonzero(ends.labels != IMPOSSIBLE)
+    if not possible.size:
+        raise SystemModelError("plane: all of it lies behind a rigid stop")
     rng = np.random.default_rng(seed)
-    picked = rng.choice(len(modal), min(starts, len(modal)), replace=False)
+    cells = len(possible)
+    picked = rng.choice(possible, min(starts, cells), replace=False)
     known = list(attractors)
-    cells = len(modal)
     count = _Count(progress, MOTION * (len(picked) + min(checks, cells)) + cells)
     shares = find_attractors(
         flow, frequency_hz, starts=modal[picked], observe=name, options=options,
@@ -407,19 +588,18 @@ def basins(
         _add(known, share.attractor)
     failed = Counter({s.attractor.failure: s.count for s in shares if s.attractor.failure})
     notes = _told(failed, len(picked), "simulations that look for attractors")
-    ends = _Ends.of(flow.to_state(modal))
-    order = rng.permutation(cells)  # so that all computations take about as long
+    order = rng.permutation(possible)  # so that all computations take about as long
     new = partial(attractor_from, flow, frequency_hz, name, options)
     enter = partial(settle, flow, omega)
     _follow_cells(ends, order, known, enter, longest, new, starts, executor, count)
-    checked = rng.choice(cells, min(checks, cells), replace=False)
+    checked = rng.choice(possible, min(checks, cells), replace=False)
     again = partial(_index_of, flow, frequency_hz, name, options, known)
     stage = count.stage(MOTION * len(checked))
     results = values_of(again, [flow.to_state(modal[cell]) for cell in checked], executor, stage)
     wrong = sum(index != ends.labels[cell] for cell, index in zip(checked, results, strict=True))
-    counts = np.array([max(attractor.period, 1) for attractor in known] + [1])
+    counts = np.array([max(attractor.period, 1) for attractor in known] + [1, 1])
     failures = ends.failures[ends.failures != ""]
-    notes += _told(Counter(failures.tolist()), len(modal), "cells")
+    notes += _told(Counter(failures.tolist()), cells, "cells")
     return Basins(
         plane,
         frequency_hz,
@@ -431,6 +611,14 @@ def basins(
         int(wrong),
         tuple(notes),
     )
+
+
+def check_has_basins(flow: FlowMap, frequency_hz: float) -> None:
+    """Refuse a frequency that makes no sense, and a system that has no attractors at it."""
+    check_frequency("frequency_hz", frequency_hz)
+    check_bounded(flow, 2.0 * math.pi * frequency_hz)
+    if flow.system.conservative:
+        raise SystemModelError("basins: a system without damping has no attractors")
 
 
 def _follow_cells(
@@ -541,10 +729,8 @@ def _check_known(attractors: Sequence[Attractor], system: System, frequency_hz: 
 
 
 def _add(known: list[Attractor], attractor: Attractor) -> None:
-    """Keep an attractor that is new and not a motion that has yet to settle, or never does."""
-    if attractor.kind in ("failed", "undecided", "drifting"):
-        return
-    if not any(same_attractor(attractor, other) for other in known):
+    """Keep what is an attractor, and new."""
+    if attractor.lasting and not any(same_attractor(attractor, other) for other in known):
         known.append(attractor)
 
 

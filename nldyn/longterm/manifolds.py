@@ -349,7 +349,7 @@ def _neighbours(found: Basins) -> np.ndarray:
     for di, dj in ((0, 1), (1, 0)):
         a = labels[: labels.shape[0] - di, : labels.shape[1] - dj]
         b = labels[di:, dj:]
-        rows, columns = np.nonzero((a != b) & (a != UNDECIDED) & (b != UNDECIDED))
+        rows, columns = np.nonzero((a != b) & (a >= 0) & (b >= 0))
         first = np.column_stack([rows, columns])
         pairs.append(np.stack([first, first + np.array([di, dj])], axis=1))
     return np.concatenate(pairs)

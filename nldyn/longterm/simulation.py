@@ -22,7 +22,7 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.flow.flow_map import FlowMap, Trajectory, flow_of
-from nldyn.flow.rigid import rest_forces
+from nldyn.flow.rigid import behind_rigid_stops, rest_forces
 from nldyn.orbits.history import History
 from nldyn.orbits.newton import check_bounded
 from nldyn.orbits.orbit import Orbit, check_observe, history_of
@@ -447,7 +447,10 @@ def starting_state(flow: FlowMap, start: Real | None) -> Real:
             f"start must have {size} entries, displacements and velocities of "
             f"{flow.system.size} modes, got shape {modal.shape}"
         )
-    return flow.to_state(modal)
+    state = flow.to_state(modal)
+    if behind_rigid_stops(flow, state[None])[0]:
+        raise SystemModelError("start lies behind a rigid stop, where no motion can begin")
+    return state
 
 
 def transient_end(

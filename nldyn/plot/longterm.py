@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_choice, check_types, is_finite, numbers, shown
 from nldyn.branches.branch import Branch, check_branches
-from nldyn.longterm.attractors import Attractor
 from nldyn.longterm.basins import Basins
 from nldyn.longterm.measures import UNITS as MEASURE_UNITS
 from nldyn.longterm.measures import SpectraMap
-from nldyn.longterm.neighbourhoods import UNDECIDED
 from nldyn.longterm.poincare import BruteForce, Column, impact_section, stroboscopic_section
 from nldyn.longterm.simulation import Motion
 from nldyn.orbits.orbit import check_observe, stroboscopic
@@ -45,6 +43,7 @@ KIND_COLOURS = {
     "drifting": "#009e73",
     "undecided": "#999999",
 }
+BEHIND = "#9a9a9a"  # states where no motion begins
 SHADE = "#e8c9a0"
 Quantity = Literal["peak", "strobe", "impact speed", "impact phase"]
 QUANTITIES = {
@@ -598,14 +597,6 @@ def _points(name: str, given: Real) -> Real:
     return points
 
 
-def _title(attractor: Attractor) -> str:
-    """Name of an attractor, with its impacts if it is periodic."""
-    if attractor.orbit is None:
-        return attractor.name
-    count = attractor.orbit.impacts
-    return f"{attractor.name} ({count} impact{'' if count == 1 else 's'})"
-
-
 def _coloured(found: Basins) -> tuple[Real, list[Any]]:
     """Colours (ny, nx, 3) of the cells, and entries of the legend."""
     image = np.ones((*found.labels.shape, 3))
@@ -613,15 +604,21 @@ def _coloured(found: Basins) -> tuple[Real, list[Any]]:
     for index, basin in enumerate(found.basins):
         base = np.asarray(to_rgb(PERIOD_COLOURS[index % len(PERIOD_COLOURS)]), dtype=float)
         phases = max(basin.attractor.period, 1)
+        if phases > 1:
+            handles.append(Patch(color="none", label=basin.text))
         for phase in range(phases):
             here = (found.labels == index) & (found.phases == phase)
             if not here.any():
                 continue
             tint = base + (1.0 - base) * 0.75 * phase / phases
             image[here] = tint
-            which = f", phase {phase}" if phases > 1 else ""
-            label = f"{_title(basin.attractor)}{which}: {100.0 * here.mean():.1f} %"
+            share = 100.0 * float(here[found.possible].mean())
+            label = f"phase {phase}: {share:.1f} %" if phases > 1 else basin.text
             handles.append(Patch(color=tuple(tint), label=label))
-    if np.any(found.labels == UNDECIDED):
-        handles.append(Patch(color="white", label=f"undecided: {100.0 * found.undecided:.1f} %"))
+    if found.undecided:
+        label = f"undecided: {100.0 * found.undecided:.1f} %"
+        handles.append(Patch(facecolor="white", edgecolor="black", linewidth=0.5, label=label))
+    if not found.possible.all():
+        image[~found.possible] = to_rgb(BEHIND)
+        handles.append(Patch(color=BEHIND, label="behind a rigid stop"))
     return image, handles

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from nldyn import (
     ExploreOptions,
     FlowMap,
     HarmonicForce,
+    RigidStop,
     StatePlane,
     Stop,
     System,
@@ -25,6 +28,7 @@ from nldyn import (
     find_attractors,
     harmonics,
     impacts,
+    lyapunov_exponents,
     simulate,
     solve_orbit,
     sweep,
@@ -588,11 +592,48 @@ def test_pictures_show_what_was_found(one_dof, from_35_to_40, at_50_hz, tmp_path
     assert "chaotic range" in labels and "periodic motion" in labels
     ax = plot_basins(at_50_hz, times=True)
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert labels[0].startswith("period 2 (1 impact), phase 0: ")
+    assert labels[0].startswith("period 2, 1 impact: 100.0 ± ")
+    assert [label.partition(":")[0] for label in labels[1:]] == ["phase 0", "phase 1"]
     motion = simulate(one_dof, 36.0, periods=20)
     assert plot_section(motion).get_xlabel() == "displacement of middle (µm)"
     assert len(plot_sweep(sweep(one_dof, (20.0, 21.0), 5.0)).lines) == 1
     ax.figure.savefig(tmp_path / "basins.png")
+
+
+def test_a_straight_edge_leaves_half_a_row_of_cells_uncertain(at_50_hz):
+    labels = np.zeros((16, 16), dtype=int)
+    labels[:, 12:] = -2  # impossible: 192 cells are left
+    labels[:, 6:12] = -1
+    found = replace(at_50_hz, labels=labels)
+    assert found.undecided == 0.5
+    (basin,) = found.basins
+    assert (basin.share, basin.uncertainty) == (0.5, pytest.approx(8 / 192))
+    assert "25.0 % of the plane lies behind a rigid stop" in found.report()
+
+
+def test_a_plane_of_two_displacements_has_them_and_changes_the_rest_least():
+    system = System.from_modal([1.0, 2.0, 3.0], {"a": [1.0, 2.0, 3.0], "b": [1.0, 0.0, -1.0]})
+    origin = np.arange(1.0, 7.0)
+    a, b = ("displacement", "a"), ("displacement", "b")
+    plane = StatePlane.spanned_by(system, a, b, (-1.0, 1.0), (2.0, 4.0), origin=origin)
+    states = plane.states((2, 4))
+    x, y = plane.axes((2, 4))
+    assert states[..., :3] @ [1.0, 2.0, 3.0] == pytest.approx(np.tile(x, (2, 1)))
+    assert states[..., :3] @ [1.0, 0.0, -1.0] == pytest.approx(np.tile(y[:, None], 4))
+    kept = np.cross([1.0, 2.0, 3.0], [1.0, 0.0, -1.0])  # no direction of either interface
+    assert states[..., :3] @ kept == pytest.approx(float(origin[:3] @ kept))
+    assert np.all(states[..., 3:] == origin[3:])
+
+
+def test_no_motion_begins_behind_a_rigid_stop():
+    system = System.from_matrices(
+        [[1.0]], [[1.0]], {"x": [-1.0]}, modal_damping=0.1,
+        stops=[RigidStop("x", 0.5, gap=0.5, direction=-1)],
+    )  # fmt: skip
+    assert simulate(system, 1.0, 1, start=[0.5, 1.0]).failure == ""
+    for run in (partial(simulate, periods=1), classify_attractor, lyapunov_exponents):
+        with pytest.raises(SystemModelError, match="start lies behind a rigid stop"):
+            run(system, 1.0, start=[0.51, -1.0])
 
 
 def test_basins_are_drawn_in_units_of_their_size(at_50_hz):

@@ -1,0 +1,60 @@
+"""Tables and picture of basins of attraction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from nldyn.longterm.basins import Basins
+from nldyn.longterm.neighbourhoods import UNDECIDED
+from nldyn.plot.diagram import save_figure
+from nldyn.plot.longterm import plot_basins
+from nldyn.report.results import if_known, write_table
+from nldyn.runtime.result_directory import result_directory
+
+COLUMNS = (
+    "attractor", "name", "share", "share_uncertainty", "period", "impacts_per_period",
+    "largest_exponent_per_s", "integrity", "distance", "evidence",
+)  # fmt: skip
+
+
+def write_basins(found: Basins, directory: str | Path, text: str, title: str = "") -> Path:
+    """Write ``attractors.csv``, ``basins.csv``, ``basins.png`` and ``.svg``, and the scene.
+
+    Raises
+    ------
+    OutputError
+        If the directory holds only other people's files or cannot be written.
+    """
+    with result_directory(directory, "basins") as folder:
+        write_table(folder / "attractors.csv", COLUMNS, attractor_rows(found))
+        columns = (found.plane.x_label, found.plane.y_label, "attractor", "phase", "periods")
+        write_table(folder / "basins.csv", columns, cell_rows(found))
+        ax = plot_basins(found)
+        if title:
+            ax.set_title(f"{title}: {ax.get_title()}")
+        save_figure(ax, folder / "basins")
+        (folder / "scene.toml").write_text(text, encoding="utf-8")
+    return Path(directory)
+
+
+def attractor_rows(found: Basins) -> Iterator[tuple[object, ...]]:
+    """Give the rows of ``attractors.csv``; the period is empty unless it is periodic."""
+    for number, basin in enumerate(found.basins, 1):
+        attractor = basin.attractor
+        values = (attractor.impact_rate, attractor.largest_exponent[0])
+        sizes = (basin.integrity, basin.distance)
+        yield (
+            number, attractor.name, basin.share, basin.uncertainty, attractor.period or None,
+            *map(if_known, map(float, values)), *map(if_known, sizes), attractor.evidence,
+        )  # fmt: skip
+
+
+def cell_rows(found: Basins) -> Iterator[tuple[object, ...]]:
+    """Give the rows of ``basins.csv``: attractors count from 1, 0 is undecided, -1 impossible."""
+    ny, nx = found.labels.shape
+    x, y = found.plane.axes((ny, nx))
+    for i in range(ny):
+        cells = (found.labels[i] - UNDECIDED, found.phases[i], found.periods[i])
+        for column, *cell in zip(x.tolist(), *(each.tolist() for each in cells), strict=True):
+            yield (column, float(y[i]), *cell)
