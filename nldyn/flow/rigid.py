@@ -51,6 +51,20 @@ def behind_rigid_stops(flow: FlowMap, states: Real) -> NDArray[np.bool_]:
     return behind
 
 
+def before_rigid_stops(flow: FlowMap, states: Real) -> Real:
+    """States z (k, 2n), those behind rigid stops mirrored at them, or moved to the middle."""
+    states = states.copy()
+    rigid = [i for i, stop in enumerate(flow.system.stops) if isinstance(stop, RigidStop)]
+    for row, stop in zip(flow.rows[rigid], [flow.system.stops[i] for i in rigid], strict=True):
+        depth = np.maximum(states @ row - stop.gap, 0.0)
+        states -= 2.0 * depth[:, None] * row / (row @ row)
+    behind = behind_rigid_stops(flow, states)
+    if behind.any():
+        across = np.linalg.pinv(flow.rows[rigid]) @ flow.rows[rigid]
+        states[behind] -= states[behind] @ across.T
+    return states
+
+
 def states_before(motion: Trajectory, pieces: NDArray[np.intp]) -> Real:
     """States z (k, 2n) at the ends of what comes before some pieces of a motion.
 

@@ -323,9 +323,8 @@ class Basin:
     share : float
         Share of the cells; of those that are no possible states none counts.
     uncertainty : float
-        Of the share, by the size of the cells: the larger of half the cells at the basin's edge,
-        which may lie anywhere between the middles of two cells, and the standard error of a count
-        of as many random states [Agresti and Coull].
+        Standard error of the share from as many random states [Agresti and Coull]; a straight edge
+        along the cells leaves as much, any other less.
     integrity : float
         Radius of the largest disc within it, in units of the sides of the rectangle: the integrity
         factor of Rega and Lenci. The edge of the rectangle counts as a boundary.
@@ -418,21 +417,10 @@ class Basins:
         return Basin(
             self.attractors[index],
             float(inside[self.possible].mean()),
-            self._uncertainty(inside),
+            standard_error(int(inside.sum()), int(self.possible.sum())),
             float(depth.max()),
             self._distance(index, inside),
         )
-
-    def _uncertainty(self, inside: NDArray[np.bool_]) -> float:
-        """Of the share of some cells."""
-        possible = self.possible
-        padded = np.pad(inside | ~possible, 1, constant_values=True)
-        around = (padded[:-2, 1:-1], padded[2:, 1:-1], padded[1:-1, :-2], padded[1:-1, 2:])
-        edge = inside & ~np.logical_and.reduce(around)
-        count = int(possible.sum()) + 4
-        share = (int(inside.sum()) + 2) / count
-        statistical = math.sqrt(share * (1.0 - share) / count)
-        return max(0.5 * float(edge[possible].mean()), statistical)
 
     def report(self) -> str:
         """Lines for a reader: each attractor with its share, what was undecided, what failed."""
@@ -611,6 +599,18 @@ def basins(
         int(wrong),
         tuple(notes),
     )
+
+
+def standard_error(hits: int, count: int) -> float:
+    """Of a share, from the hits among independent trials; not zero where all or none hit.
+
+    Examples
+    --------
+    >>> round(standard_error(50, 100), 3), round(standard_error(0, 96), 3)
+    (0.049, 0.014)
+    """
+    share = (hits + 2.0) / (count + 4.0)
+    return math.sqrt(share * (1.0 - share) / (count + 4.0))
 
 
 def check_has_basins(flow: FlowMap, frequency_hz: float) -> None:

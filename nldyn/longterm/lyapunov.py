@@ -29,6 +29,7 @@ from nldyn.system.system import System
 BLOCK = 64  # periods in one call
 FEWEST_BLOCKS = 16  # from which an error is estimated
 SQUEEZE = 4.0  # most e-foldings by which the linear part may shrink a direction over a segment
+NOTHING = 1e-14  # of a Jacobian's size: directions that a body's rest on a rigid stop ends
 CLEAR = 3.0  # standard errors
 RESOLVED = 1e-3  # least logarithm of a shrinkage over all periods that is told from none
 SLOW_GROWTH = 5.0  # logarithm of a growth that goes with a power of the time, beside that of it
@@ -46,7 +47,7 @@ class LyapunovSpectrum:
     frequency_hz : float
         Excitation frequency in Hz.
     exponents : (2n,)
-        In 1/s, largest first.
+        In 1/s, largest first; -inf for what is forgotten where a body rests on a rigid stop.
     errors : (2n,)
         Standard errors in 1/s, from averages over blocks of periods.
     divergence : float
@@ -84,7 +85,10 @@ class LyapunovSpectrum:
     @property
     def sum_error(self) -> float:
         """How far the sum is from the divergence, relative to it (or to 1/s where that is less)."""
-        return abs(float(self.exponents.sum()) - self.divergence) / max(abs(self.divergence), 1.0)
+        total = float(self.exponents.sum())
+        if total == self.divergence:  # both infinite, where a body rests
+            return 0.0
+        return abs(total - self.divergence) / max(abs(self.divergence), 1.0)
 
     @property
     def growth(self) -> float:
@@ -260,13 +264,15 @@ def spectrum_from(
     state, _, _ = _grown(flow, state, omega, before, turning, parts, basis)
     state, stretches, viscous = _grown(flow, state, omega, before + turning, periods, parts, basis)
     rates = stretches * (omega / (2.0 * math.pi))
-    order = np.argsort(-rates.mean(axis=0), kind="stable")
+    means, errors = rates.mean(axis=0), np.zeros(state.size)
+    errors[np.isfinite(means)] = standard_errors(rates[:, np.isfinite(means)])
+    order = np.argsort(-means, kind="stable")
     divergence = -float(np.trace(flow.system.total_damping))
     divergence -= viscous / (periods * 2.0 * math.pi / omega)
     return LyapunovSpectrum(
         omega / (2.0 * math.pi),
-        rates.mean(axis=0)[order],
-        standard_errors(rates)[order],
+        means[order],
+        errors[order],
         divergence,
         periods,
         state,
@@ -291,7 +297,7 @@ def _grown(
     """Last state, stretches per period (periods, 2n) and ∫ of the stops' damping, in blocks."""
     lossy = flow.system.loses_by_speed
     stretches = np.empty((periods, state.size))
-    viscous = 0.0
+    viscous = lost = 0.0
     at_once = periods_at_once(flow, BLOCK)
     for first in range(0, periods, at_once):
         count = min(at_once, periods - first)
@@ -303,8 +309,9 @@ def _grown(
             raise ConvergenceError(f"the simulation at {hz:g} Hz failed: {found.failure}")
         if lossy:
             motion = here.trajectory(state[None], phases, omega, chained=True)
-            viscous += contact_damping(here, motion)
-        grown = growth_rates(found.jacobians, basis)
+            lost = contact_damping(here, motion)
+            viscous += lost
+        grown = growth_rates(found.jacobians, basis, NOTHING if math.isinf(lost) else 0.0)
         stretches[first : first + count] = grown.reshape(count, parts, -1).sum(axis=1)
         state = found.ends[-1]
     return state, stretches, viscous

@@ -11,6 +11,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, check_frequency, check_whole
 from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.flow.rigid import before_rigid_stops
 from nldyn.orbits.newton import check_bounded, refine, spread
 from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, same_orbit, stroboscopic
 from nldyn.orbits.shooting import (
@@ -111,7 +112,7 @@ def random_states(flow: FlowMap, omega: float, count: int, seed: int | Sequence[
         scale = 0.0 if index == 0 else size * 10.0 ** rng.uniform(-0.5, 1.0)
         states[index] = scale * rng.standard_normal(n) / math.sqrt(n)
     states[0] = flow.to_state(at_rest(rest(flow.system)))
-    return states
+    return before_rigid_stops(flow, states)
 
 
 def simulate(flow: FlowMap, omega: float, starts: Real, transient: int, recorded: int) -> Strobe:

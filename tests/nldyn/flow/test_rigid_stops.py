@@ -20,6 +20,7 @@ from nldyn import (
     impacts,
     simulate,
 )
+from nldyn.orbits.starts import random_states
 
 G = 9.81
 PERIOD = np.array([0.0, 2.0 * np.pi])
@@ -365,3 +366,23 @@ def test_a_rigid_stop_has_no_stiffness_and_an_elastic_one_no_restitution():
             FlowMap(system).shoot(
                 np.zeros((1, 2)), PERIOD, 1.0, parameters=[Parameter(name, index)]
             )
+
+
+def test_random_states_lie_in_front_of_all_rigid_stops():
+    """Also where two shut the same gap of no width, and only the middle is left."""
+    pair = [RigidStop("a", 0.5, gap=1.0), RigidStop("a", 0.5, gap=2.0, direction=-1)]
+    shut = [RigidStop("b", 0.5), RigidStop("b", 0.5, direction=-1)]
+    system = System.from_matrices(
+        np.eye(2), [[2.0, -1.0], [-1.0, 2.0]], {"a": [1.0, 0.0], "b": [0.0, 1.0]},
+        modal_damping=0.1, stops=pair + shut, excitation=[HarmonicForce("a", 1.0)],
+    )  # fmt: skip
+    flow = FlowMap(system)
+    states = flow.to_modal(random_states(flow, 1.0, 50, 3))
+    a, b = (states[:, :2] @ system.participation[name] for name in "ab")
+    assert np.all((a <= 1.0 + 1e-8) & (a >= -2.0 - 1e-8))
+    assert np.abs(b).max() < 1e-9 and np.ptp(states[:, 2:] @ system.participation["b"]) > 0.0
+    flow = FlowMap(system.with_elements(stops=pair))
+    states = flow.to_modal(random_states(flow, 1.0, 50, 3))
+    a = states[:, :2] @ system.participation["a"]
+    assert np.all((a <= 1.0 + 1e-8) & (a >= -2.0 - 1e-8))
+    assert np.ptp(a) > 1.0 and np.ptp(states[:, 2:]) > 0.0

@@ -600,14 +600,14 @@ def test_pictures_show_what_was_found(one_dof, from_35_to_40, at_50_hz, tmp_path
     ax.figure.savefig(tmp_path / "basins.png")
 
 
-def test_a_straight_edge_leaves_half_a_row_of_cells_uncertain(at_50_hz):
+def test_shares_are_those_of_the_possible_states_with_the_error_of_a_count(at_50_hz):
     labels = np.zeros((16, 16), dtype=int)
     labels[:, 12:] = -2  # impossible: 192 cells are left
     labels[:, 6:12] = -1
     found = replace(at_50_hz, labels=labels)
     assert found.undecided == 0.5
     (basin,) = found.basins
-    assert (basin.share, basin.uncertainty) == (0.5, pytest.approx(8 / 192))
+    assert (basin.share, basin.uncertainty) == (0.5, pytest.approx(0.5 / math.sqrt(196)))
     assert "25.0 % of the plane lies behind a rigid stop" in found.report()
 
 

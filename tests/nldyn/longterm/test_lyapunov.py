@@ -9,9 +9,11 @@ from problems import driven, make_one_dof
 from scipy.optimize import brentq
 
 from nldyn import (
+    ConstantForce,
     FlowMap,
     FlowOptions,
     HarmonicForce,
+    RigidStop,
     Stop,
     System,
     SystemModelError,
@@ -70,6 +72,21 @@ def test_sum_is_the_divergence_also_with_a_lossy_stop():
     plain = -2.0 * 0.0142 * np.sqrt(16877.0 / 2.48)
     assert found.divergence < plain - 0.01
     assert found.sum_error < 1e-7
+
+
+def test_a_body_that_comes_to_rest_forgets_what_was_before():
+    """A shaken ball rests on its table now and then: -∞ twice, beside -c/2 of an oscillator."""
+    table = RigidStop("ball", 0.5, direction=-1)
+    loads = [ConstantForce("ball", -9.81), HarmonicForce("ball", 19.62), HarmonicForce("x", 1.0)]
+    system = System.from_matrices(
+        np.eye(2), np.diag([0.0, 1.0]), {"ball": [1.0, 0.0], "x": [0.0, 1.0]},
+        damping=np.diag([0.0, 0.4]), stops=[table], excitation=loads,
+    )  # fmt: skip
+    found = lyapunov_exponents(system, 1.0, transient=20, periods=300)
+    assert found.exponents[:2] == pytest.approx([-0.2, -0.2], abs=1e-3)
+    assert list(found.exponents[2:]) == [-np.inf, -np.inf] and not found.errors[2:].any()
+    assert found.divergence == -np.inf and found.sum_error == 0.0
+    assert found.decaying and found.dimension == 0.0
 
 
 def ueda() -> System:
