@@ -8,23 +8,26 @@ be one with each mixture of impacts and misses.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, SystemModelError
+from nldyn.base.errors import ConvergenceError, LocateError, SystemModelError
 from nldyn.bifurcations.normal_form_coefficients import CoefficientError
-from nldyn.bifurcations.point import BranchNode
+from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.rigid_grazing import Beside, RootMap
 from nldyn.bifurcations.rigid_touch import Touches
 from nldyn.bifurcations.sign_changes import accounted
 from nldyn.bifurcations.touching import rigid_touches
 from nldyn.orbits.bordered import length_unit
+from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import FROM_NEAR, asymmetry, metric_length
 
 SLIGHT = 1e-5, 1e-4, 1e-3  # first impacts and misses looked for, depth over the orbit's size
+FOLLOWED = 2e-6  # least impact with which a branch can begin: slower ones are not followed
 AS_ASKED = 0.1  # relative difference of the depth found from it
 LIMITS = 10.0  # over the largest multiplier: how far others may be from their limits at grazing
 SYMMETRIC = 1e-8  # relative asymmetry of an orbit that is rounding
@@ -65,9 +68,79 @@ def beyond_rigid_grazing(at: BranchNode, before: Orbit) -> BranchNode | None:
     return replace(found, arclength=at.arclength + way)
 
 
-def first_beside(exact: Orbit, touches: Touches, beside: Beside) -> BranchNode | None:
-    """The orbit of a kind nearest to a grazing that is found, heading away from it."""
-    found = (_beside(exact, touches, beside, share) for share in SLIGHT)
+def switch_at_rigid_grazing(special: SpecialPoint, times: int = 1) -> list[BranchNode]:
+    """First points of the branches with slight impacts that begin at a grazing of rigid stops.
+
+    Parameters
+    ----------
+    special : SpecialPoint
+        The grazing (GR).
+    times : int
+        Over how many of its periods those are periodic. With more than one they have one slight
+        impact in all of them: the maximal orbits of Nordmark (1991).
+
+    Returns
+    -------
+    list of BranchNode
+        One for each kind of impacts, heading away from the grazing.
+
+    Raises
+    ------
+    SystemModelError
+        If no rigid stop is grazed.
+    LocateError
+        If no such orbits begin there, or none is found.
+    """
+    exact, hz = special.orbit, f"{special.frequency_hz:.6g} Hz"
+    if not Grazing.of(exact).half:
+        raise SystemModelError(f"no branch leaves the grazing at {hz}, which is of an elastic stop")
+    try:
+        touches = Touches.of(exact, times)
+        form = RootMap.of(touches)
+        kinds = form.beside if times == 1 else form.with_one_hit(len(touches.stops) // times)
+        found = [
+            first_beside(exact, touches, kind, _shares(exact, touches, form, kind))
+            for kind in kinds
+            if any(kind.hits)
+        ]
+    except (CoefficientError, ConvergenceError, np.linalg.LinAlgError) as error:
+        raise LocateError(f"no orbit is found beside the grazing at {hz}: {error}") from None
+    period = times * exact.period
+    if not found:
+        raise LocateError(f"no orbit of period {period} with an impact begins at {hz}")
+    nodes = [node for node in found if node is not None]
+    if not nodes:
+        raise LocateError(
+            f"no orbit of period {period} is found beside the grazing at {hz}: its impacts are too "
+            "slow there"
+        )
+    return nodes
+
+
+def _shares(exact: Orbit, touches: Touches, form: RootMap, kind: Beside) -> Sequence[float]:
+    """Sizes of the first impacts looked for, over that of the orbit.
+
+    With one impact in several periods the speed goes with the distance up to where the multiplier
+    has fallen to about 1, beyond with its root.
+    """
+    if sum(kind.hits) > 1:
+        return SLIGHT
+    growth = abs(form.growth(kind.hits.index(True))) / (touches.omega * length_unit(exact))
+    share = min(0.1 * growth, SLIGHT[-1])
+    return [part for part in (share, 0.3 * share, 0.1 * share, *SLIGHT) if FOLLOWED < part <= share]
+
+
+def first_beside(
+    exact: Orbit, touches: Touches, beside: Beside, shares: Sequence[float] = SLIGHT
+) -> BranchNode | None:
+    """The orbit of a kind with the first of some sizes that is found, heading away.
+
+    Raises
+    ------
+    ConvergenceError, SystemModelError
+        If none can be looked for.
+    """
+    found = (_beside(exact, touches, beside, share) for share in shares)
     return next((node for node in found if node is not None), None)
 
 
@@ -142,7 +215,10 @@ def _beside(exact: Orbit, touches: Touches, beside: Beside, share: float) -> Bra
     shape = np.array(beside.amounts) * unit[lead] / beside.amounts[lead]
     places = []
     for size in (0.5 * depth, depth):
-        moved, amounts = touches.moved(beside.hits, size * shape, lead)
+        try:
+            moved, amounts = touches.moved(beside.hits, size * shape, lead)
+        except ConvergenceError:
+            return None
         places.append(moved.unknowns(np.where(hit, amounts, 0.0)))
     problem, times = touches.problem, touches.problem.period // exact.period
     grazing = np.append(np.tile(exact.point[:-1], times), exact.point[-1])

@@ -528,18 +528,18 @@ def _several_grazings(special: SpecialPoint, touches: Touches, form: RootMap) ->
     """Grazing of an orbit in several touches at once: which orbits begin there, on either side."""
     orbit, hz = special.orbit, _hz(special)
     count, shorter, beside = len(touches.stops), minimal_period(orbit), form.beside
+    every = count * shorter // orbit.period
     names = ", ".join(
         _stop_name(orbit, stop, phase)
-        for stop, phase in zip(touches.stops, touches.phases.tolist(), strict=True)
+        for stop, phase in zip(touches.stops[:every], touches.phases.tolist(), strict=False)
     )
     touched = f"Grazing at {hz} in {NUMBERS.get(count, str(count))} touches at once: rigid {names}"
     if shorter < orbit.period:
         touched += f", of an orbit of period {shorter} run through {orbit.period // shorter} times"
-    every = count * shorter // orbit.period
     sides = []
     for side in (1, -1):
         kinds = {  # one of those that are the same but for when they begin
-            min(each.hits[turn:] + each.hits[:turn] for turn in range(0, count, every)): None
+            max(each.hits[turn:] + each.hits[:turn] for turn in range(0, count, every)): None
             for each in beside
             if each.side == side
         }
@@ -564,12 +564,14 @@ def _several_grazings(special: SpecialPoint, touches: Touches, form: RootMap) ->
 
 def _with_impacts(hits: tuple[bool, ...]) -> str:
     """Say at which touches impacts are."""
-    places = [str(number) for number, hit in enumerate(hits, 1) if hit]
-    if not places:
+    *places, last = [str(number) for number, hit in enumerate(hits, 1) if hit] or [""]
+    if not last:
         return "without an impact"
     if all(hits):
         return "with an impact at each touch"
-    return f"with impacts at touch {' and '.join(places)} alone"
+    if not places:
+        return f"with an impact at touch {last} alone"
+    return f"with impacts at touches {', '.join(places)} and {last} alone"
 
 
 def _behind_grazing(multiplier: float) -> str:

@@ -117,12 +117,16 @@ class RootMap:
         found = np.einsum("mn,mnk->mk", self.rows, ways)
         return found[:, 0], found[:, 1:]
 
-    def effect(self, first: int, periods: int = 1) -> float:
-        """Of an impact on its own touch, some periods later: c A b."""
+    def effect(self, first: int) -> float:
+        """Of an impact on its own touch, a period later: c A b."""
         effect, m = self.kicks[first], len(self.rows)
-        for i in range(first, first + periods * m):
+        for i in range(first, first + m):
             effect = self.jacobians[i % m] @ effect
         return float(self.rows[first] @ effect)
+
+    def growth(self, first: int) -> float:
+        """Multiplier times speed of orbits with an impact at one touch only: -(1 + e) a c A b."""
+        return float(-self.losses[first] * self.decelerations[first] * self.effect(first))
 
     @property
     def lowers(self) -> bool:
@@ -151,6 +155,12 @@ class RootMap:
         if not (side * amounts > 0.0).all():
             return None
         return Beside(hits, side, tuple((side * amounts).tolist()))
+
+    def with_one_hit(self, touches: int) -> list[Beside]:
+        """The orbits with an impact at one of the first touches, and no other one."""
+        m = len(self.rows)
+        single = (tuple(i == first for i in range(m)) for first in range(touches))
+        return [beside for hits in single if (beside := self.with_hits(hits)) is not None]
 
     @property
     def beside(self) -> list[Beside]:
@@ -200,7 +210,7 @@ class RigidGrazing:
         if by_speed == 0.0:
             raise CoefficientError("an impact leaves no trace over a period")
         return cls(
-            growth=float(-form.losses[0] * form.decelerations[0] * form.effect(0)),
+            growth=form.growth(0),
             speed_change=float(-height_change / by_speed),
             height_change=float(height_change),
             lowers=form.lowers,

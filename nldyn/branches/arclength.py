@@ -90,12 +90,13 @@ class StepperState:
 def grazes_rigid(
     orbit: Orbit, least: float, most: float, but: Callable[[int, float], bool] | None = None
 ) -> StopReason | None:
-    """The reason to stop, if the slightest impact with a rigid stop, or nearest miss, is so deep.
+    """The reason to stop, if an impact with a rigid stop, or a near miss, is so deep.
 
     Both bounds are shares of the orbit's size; `but` is as for `rigid_grazing`.
     """
-    found = rigid_grazing(orbit, but)
-    if found is None or not least < found[2] / length_unit(orbit) < most:
+    unit, touches = length_unit(orbit), rigid_touches(orbit)
+    slight = [each[:2] for each in touches if least < each[2] / unit < most]
+    if not slight or (but is not None and all(but(*each) for each in slight)):
         return None
     return Ending.GRAZES_RIGID.told(hz=f"{orbit.frequency_hz:.9g}")
 

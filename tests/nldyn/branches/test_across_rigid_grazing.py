@@ -149,7 +149,7 @@ def test_two_stops_tuned_to_graze_at_once_end_a_branch_where_three_kinds_of_orbi
     sentence = normal_form(touch).sentence
     assert "above 0.52 Hz without an impact; below 0.52 Hz" in sentence
     for i, j in ((0, 1), (1, 0)):
-        assert f"with impacts at touch {i + 1} alone" in sentence
+        assert f"with an impact at touch {i + 1} alone" in sentence
         shape = OneImpact(*matrices, force, rows[i], gaps[i], 0.8)
         assert not [m for m in shape.motions(1.0001 * omega, 1) if m.speed < 0.01]
         motion = shape.motions(0.9999 * omega, 1)[-1]
