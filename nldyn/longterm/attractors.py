@@ -175,6 +175,15 @@ class Attractor:
         return len(impacts(self.motion())) / RECORDED if self.lasting else math.nan
 
     @property
+    def span(self) -> tuple[float, float]:
+        """Smallest and largest displacement of the first interface in m."""
+        motion = self.motion()
+        name = check_observe(motion.system, None)
+        ends = motion.history(2).displacement[name]
+        values = np.concatenate([motion.extremes(name)[1], ends])
+        return float(values.min()), float(values.max())
+
+    @property
     def title(self) -> str:
         """Such as ``period 3, 2 impacts`` or ``chaotic, 0.81 impacts per period``."""
         if self.orbit is not None:

@@ -318,6 +318,8 @@ class Basin:
 
     Parameters
     ----------
+    number : int
+        Of the attractor, from 1.
     attractor : Attractor
         The attractor.
     share : float
@@ -333,6 +335,7 @@ class Basin:
         units: their local integrity measure. nan if none of its points lies in the rectangle.
     """
 
+    number: int
     attractor: Attractor
     share: float
     uncertainty: float
@@ -345,9 +348,10 @@ class Basin:
 
     @property
     def text(self) -> str:
-        """Such as ``period 2, 1 impact: 40.0 ± 0.5 %``."""
+        """Such as ``1: 40.0 ± 0.5 %, period 2, 1 impact, -0.001 to 0.002 m``."""
         percent = f"{100.0 * self.share:.1f} ± {100.0 * self.uncertainty:.1f} %"
-        return f"{self.attractor.title}: {percent}"
+        low, high = self.attractor.span
+        return f"{self.number}: {percent}, {self.attractor.title}, {low:.3g} to {high:.3g} m"
 
 
 @dataclass(frozen=True, eq=False)
@@ -415,6 +419,7 @@ class Basins:
         ny, nx = inside.shape
         depth = np.asarray(distance_transform_edt(np.pad(inside, 1), sampling=(1.0 / ny, 1.0 / nx)))
         return Basin(
+            index + 1,
             self.attractors[index],
             float(inside[self.possible].mean()),
             standard_error(int(inside.sum()), int(self.possible.sum())),

@@ -604,8 +604,9 @@ def _coloured(found: Basins) -> tuple[Real, list[Any]]:
     for index, basin in enumerate(found.basins):
         base = np.asarray(to_rgb(PERIOD_COLOURS[index % len(PERIOD_COLOURS)]), dtype=float)
         phases = max(basin.attractor.period, 1)
+        text = basin.text.replace(" %, ", " %\n")
         if phases > 1:
-            handles.append(Patch(color="none", label=basin.text))
+            handles.append(Patch(color="none", label=text))
         for phase in range(phases):
             here = (found.labels == index) & (found.phases == phase)
             if not here.any():
@@ -613,7 +614,7 @@ def _coloured(found: Basins) -> tuple[Real, list[Any]]:
             tint = base + (1.0 - base) * 0.75 * phase / phases
             image[here] = tint
             share = 100.0 * float(here[found.possible].mean())
-            label = f"phase {phase}: {share:.1f} %" if phases > 1 else basin.text
+            label = f"phase {phase}: {share:.1f} %" if phases > 1 else text
             handles.append(Patch(color=tuple(tint), label=label))
     if found.undecided:
         label = f"undecided: {100.0 * found.undecided:.1f} %"

@@ -14,7 +14,8 @@ from nldyn.runtime.result_directory import result_directory
 
 COLUMNS = (
     "attractor", "name", "share", "share_uncertainty", "period", "impacts_per_period",
-    "largest_exponent_per_s", "integrity", "distance", "evidence",
+    "min_displacement_m", "max_displacement_m", "largest_exponent_per_s", "integrity", "distance",
+    "evidence",
 )  # fmt: skip
 
 
@@ -32,7 +33,7 @@ def write_basins(found: Basins, directory: str | Path, text: str, title: str = "
         write_table(folder / "basins.csv", columns, cell_rows(found))
         ax = plot_basins(found)
         if title:
-            ax.set_title(f"{title}: {ax.get_title()}")
+            ax.set_title(f"{title}\n{ax.get_title()}")
         save_figure(ax, folder / "basins")
         (folder / "scene.toml").write_text(text, encoding="utf-8")
     return Path(directory)
@@ -40,13 +41,15 @@ def write_basins(found: Basins, directory: str | Path, text: str, title: str = "
 
 def attractor_rows(found: Basins) -> Iterator[tuple[object, ...]]:
     """Give the rows of ``attractors.csv``; the period is empty unless it is periodic."""
-    for number, basin in enumerate(found.basins, 1):
+    for basin in found.basins:
         attractor = basin.attractor
-        values = (attractor.impact_rate, attractor.largest_exponent[0])
-        sizes = (basin.integrity, basin.distance)
+        values = (
+            attractor.impact_rate, *attractor.span, float(attractor.largest_exponent[0]),
+            basin.integrity, basin.distance,
+        )  # fmt: skip
         yield (
-            number, attractor.name, basin.share, basin.uncertainty, attractor.period or None,
-            *map(if_known, map(float, values)), *map(if_known, sizes), attractor.evidence,
+            basin.number, attractor.name, basin.share, basin.uncertainty, attractor.period or None,
+            *map(if_known, values), attractor.evidence,
         )  # fmt: skip
 
 

@@ -592,7 +592,7 @@ def test_pictures_show_what_was_found(one_dof, from_35_to_40, at_50_hz, tmp_path
     assert "chaotic range" in labels and "periodic motion" in labels
     ax = plot_basins(at_50_hz, times=True)
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert labels[0].startswith("period 2, 1 impact: 100.0 ± ")
+    assert labels[0].startswith("1: 100.0 ± 0.5 %\nperiod 2, 1 impact, ")
     assert [label.partition(":")[0] for label in labels[1:]] == ["phase 0", "phase 1"]
     motion = simulate(one_dof, 36.0, periods=20)
     assert plot_section(motion).get_xlabel() == "displacement of middle (µm)"

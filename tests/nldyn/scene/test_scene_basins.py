@@ -62,7 +62,8 @@ def test_two_wells_have_the_same_share_and_each_cell_ends_in_its_own(tmp_path):
     ranges = ("--x-range", "-2", "2", "--y-range", "-1.5", "1.5")
     result = told(tmp_path, WELLS, *HZ, *ranges, "--cells", "8")
     assert result.exit_code == 0, result.stderr
-    assert len(re.findall(r"period 1, no impacts: 50\.0 ± ", result.stdout)) == 2
+    said = re.findall(r"\d: 50.0 ± 6.1 %, period 1, no impacts, (\S+) to (\S+) m", result.stdout)
+    assert sorted(said) == [("-1", "-1"), ("1", "1")]  # ± sqrt(1/4 / (64 + 4))
     assert "undecided" not in result.stdout
     assert "0 of 40 cells that were simulated once more" in result.stdout
     shares = [float(row["share"]) for row in rows(tmp_path / "out" / "attractors.csv")]
