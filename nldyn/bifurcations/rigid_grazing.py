@@ -124,6 +124,12 @@ class RootMap:
             effect = self.jacobians[i % m] @ effect
         return float(self.rows[first] @ effect)
 
+    @property
+    def trace(self) -> float:
+        """Effect of an impact on the next touch, c A b over the sizes of c and A b."""
+        effect, row = self.jacobians[0] @ self.kicks[0], self.rows[1 % len(self.rows)]
+        return float(row @ effect / (np.linalg.norm(row) * np.linalg.norm(effect)))
+
     def growth(self, first: int) -> float:
         """Multiplier times speed of orbits with an impact at one touch only: -(1 + e) a c A b."""
         return float(-self.losses[first] * self.decelerations[first] * self.effect(first))

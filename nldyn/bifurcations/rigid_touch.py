@@ -61,8 +61,8 @@ class Touches:
     size: float
 
     @classmethod
-    def of(cls, orbit: Orbit, times: int = 1) -> Touches:
-        """Those of an orbit that grazes, run through several times.
+    def of(cls, orbit: Orbit, times: int = 1, grazing: Grazing | None = None) -> Touches:
+        """Those of an orbit that grazes, run through several times; all unless a grazing is given.
 
         Raises
         ------
@@ -71,7 +71,8 @@ class Touches:
         SystemModelError
             If the orbit does not graze.
         """
-        grazing = Grazing.of(orbit).with_others(orbit).grazing_too(orbit)
+        if grazing is None:
+            grazing = Grazing.of(orbit).with_others(orbit).grazing_too(orbit)
         base, full = orbit.problem, 2.0 * math.pi * orbit.period
         found = sorted(
             ((each.phase + turn * each.every - base.start) % full + base.start, each.stop)

@@ -8,6 +8,9 @@ import numpy as np
 
 from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import ConvergenceError
+from nldyn.bifurcations.normal_form_coefficients import CoefficientError
+from nldyn.bifurcations.rigid_grazing import RootMap
+from nldyn.bifurcations.rigid_touch import Touches
 from nldyn.bifurcations.sign_changes import COMPLEX
 from nldyn.orbits.bordered import CLEAR, Condition, Evaluation, nearest_depth
 from nldyn.orbits.conditions import BranchPointCondition, Grazing, Singular
@@ -40,7 +43,8 @@ def codimension_tests(
     Returns
     -------
     dict of str to float
-        The names are those of MatCont, but for grazing (GR), which comes first in a pair of names.
+        The names are those of MatCont, but for grazing (GR), which comes first in a pair of names;
+        GGR is the degenerate one of a rigid stop.
     """
     mu = at.orbit.multipliers
     if isinstance(condition, Singular):
@@ -60,8 +64,22 @@ def codimension_tests(
     else:
         tests["LP"] = parameter_tangent
         tests["BP"] = branch_point_test(mu)
-    prefix = "GR" if isinstance(condition, Grazing) else ""
-    return {prefix + name: value for name, value in tests.items()}
+    if not isinstance(condition, Grazing):
+        return tests
+    found = {f"GR{name}": value for name, value in tests.items()}
+    return found | {"GGR": trace_of_impact(condition, at.orbit)} if condition.half else found
+
+
+def trace_of_impact(condition: Grazing, orbit: Orbit) -> float:
+    """What a slight impact leaves of itself up to the next grazing of the rigid stop, c A b.
+
+    Where it is zero the multiplier does not grow without bounds (Nordmark 1991; Fredriksson and
+    Nordmark 1997). It is nan where the motion around the stop fails.
+    """
+    try:
+        return RootMap.of(Touches.of(orbit, grazing=condition)).trace
+    except (CoefficientError, ConvergenceError):
+        return math.nan
 
 
 def along_folds(condition: Singular, orbit: Orbit, mu: Complex) -> dict[str, float]:

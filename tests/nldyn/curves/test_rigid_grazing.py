@@ -1,10 +1,12 @@
 """Grazing of rigid stops by its own equations, and curves of orbits with impacts."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from one_impact import OneImpact
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from nldyn import (
@@ -26,6 +28,7 @@ from nldyn.curves import refine_special
 
 DAMPING, RESTITUTION, GAP = 0.1, 0.8, 0.3
 TURN = 2.0 * math.pi
+TWO = np.eye(2), np.array([[2.0, -1.0], [-1.0, 3.0]]), np.array([[0.1, -0.05], [-0.05, 0.15]])
 
 
 def oscillator(gap=GAP, restitution=RESTITUTION):
@@ -60,7 +63,11 @@ def test_grazing_is_solved_from_the_side_with_the_impact_and_from_the_other(bran
 
 
 def test_grazing_in_frequency_and_gap_is_the_resonance_curve(branch, tmp_path):
-    """From the orbit with the slight impact; and again from a file."""
+    """From the orbit with the slight impact; and again from a file.
+
+    Where a free vibration of the frequency Ω makes half a turn in a period an impact leaves no
+    trace: c A b = exp(-0.05 T) sin(Ω T)/Ω.
+    """
     curve = continue_special(
         branch.special_points[-1], ("frequency_hz", "gap"), ((0.25, 0.4), (0.1, 12.0))
     )
@@ -68,9 +75,35 @@ def test_grazing_in_frequency_and_gap_is_the_resonance_curve(branch, tmp_path):
     assert hz[[0, -1]] == pytest.approx([0.25, 0.4], rel=1e-14)
     assert np.abs(gap / amplitude(hz) - 1.0).max() < 1e-10
     assert gap.max() > 3.0 * gap.min()
+    (mark,) = curve.marks
+    traceless = 2.0 * math.sqrt(1.0 - 0.25 * DAMPING**2) / TURN
+    assert mark.kind == "GGR"
+    assert mark.values == pytest.approx([traceless, amplitude(traceless)], rel=1e-9)
     save(curve, tmp_path / "curve.h5")
     (again,) = load(tmp_path / "curve.h5")
     assert again.points[5].residual < 1e-10
+
+
+def test_an_impact_leaves_no_trace_of_two_modes_where_their_exponential_says():
+    mass, stiffness, damping = TWO
+    system = System.from_matrices(
+        mass, stiffness, {"x": [1.0, 0.0], "y": [0.0, 1.0]}, damping=damping,
+        stops=[RigidStop("x", RESTITUTION, GAP)], excitation=[HarmonicForce("x", 1.0)],
+    )  # fmt: skip
+    calm = continue_branch(solve_orbit(system, 0.5), (0.3, 0.6))
+    touch = next(s for s in calm.special_points if s.kind == "GR" and s.orbit.impacts == 0)
+    hz = 0.39, 1.001 * touch.frequency_hz
+    curve = continue_special(touch, ("frequency_hz", "gap"), (hz, (0.01, 1.0)))
+    rates = np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, -damping]])
+    grid = np.linspace(*hz, 50)
+
+    def trace(hz):
+        return expm(rates / hz)[0, 2]
+
+    zeros = [brentq(trace, a, b) for a, b in pairwise(grid) if trace(a) * trace(b) < 0.0]
+    found = sorted(mark.values[0] for mark in curve.marks if mark.kind == "GGR")
+    assert zeros
+    assert found == pytest.approx(zeros, rel=1e-9)
 
 
 def room(hz, periods):
@@ -148,7 +181,6 @@ def test_a_body_at_rest_on_a_stop_grazes_nothing():
     assert [point.orbit.impacts for point in (curve.points[0], curve.points[-1])] == [0, 1]
 
 
-TWO = np.eye(2), np.array([[2.0, -1.0], [-1.0, 3.0]]), np.array([[0.1, -0.05], [-0.05, 0.15]])
 NORMAL_FORMS = {
     "jumps": (([[1.0]], [[1.0]], [[0.1]]), [1.0], 0.45, "where the one without ends"),
     "overdamped": (([[1.0]], [[1.0]], [[2.5]]), [1.0], 0.3, "periods that grow by one follow"),
