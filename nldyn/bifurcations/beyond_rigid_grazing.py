@@ -1,4 +1,4 @@
-"""How a branch goes on behind a grazing of rigid stops.
+"""How a branch or a curve goes on behind a grazing of rigid stops.
 
 Two families meet there, one with the slight impact and one without; each begins in proportion to
 the speed of the impact, or to the miss (Nordmark 1991; di Bernardo, Budd, Champneys and Kowalczyk
@@ -8,6 +8,7 @@ be one with each mixture of impacts and misses.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -21,13 +22,14 @@ from nldyn.bifurcations.rigid_grazing import Beside, RootMap
 from nldyn.bifurcations.rigid_touch import Touches
 from nldyn.bifurcations.sign_changes import accounted
 from nldyn.bifurcations.touching import rigid_touches
-from nldyn.orbits.bordered import length_unit
+from nldyn.orbits.bordered import Corrected, Free, OrbitFamily, correct, length_unit
 from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit, minimal_period
-from nldyn.orbits.shooting import FROM_NEAR, asymmetry, metric_length
+from nldyn.orbits.shooting import FROM_NEAR, ShootingProblem, asymmetry, metric_length
 
 SLIGHT = 1e-5, 1e-4, 1e-3  # first impacts and misses looked for, depth over the orbit's size
 FOLLOWED = 2e-6  # least impact with which a branch can begin: slower ones are not followed
+SLIGHT_BY_DIFFERENCES = 2e-3, 1e-2  # where they serve as derivatives by the parameter
 AS_ASKED = 0.1  # relative difference of the depth found from it
 LIMITS = 10.0  # over the largest multiplier: how far others may be from their limits at grazing
 SYMMETRIC = 1e-8  # relative asymmetry of an orbit that is rounding
@@ -53,19 +55,24 @@ def beyond_rigid_grazing(at: BranchNode, before: Orbit) -> BranchNode | None:
         Heading away from the grazing; None if there is no such orbit, or more than one.
     """
     exact = at.orbit
+    found = orbit_beyond(exact, before, OrbitFamily.in_frequency(exact))
+    if found is None:
+        return None
+    beyond = _as_node(exact, found)
+    return replace(beyond, arclength=at.arclength + beyond.arclength)
+
+
+def orbit_beyond(exact: Orbit, before: Orbit, family: OrbitFamily) -> Corrected | None:
+    """First orbit of a family in one parameter behind a grazing, as `beyond_rigid_grazing`."""
     try:
-        touches = Touches.of(exact)
+        touches = Touches.of(exact, family=family)
         ahead = _ahead(touches, exact, before)
         if ahead is None or _slight_touches(exact) != len(touches.stops):
             return None
-        found = first_beside(exact, touches, ahead)
+        shares = SLIGHT if family.is_exact else SLIGHT_BY_DIFFERENCES
+        return first_beside(exact, touches, ahead, shares)
     except (CoefficientError, ConvergenceError, SystemModelError, np.linalg.LinAlgError):
         return None
-    if found is None:
-        return None
-    weights = exact.problem.metric(exact.point)
-    way = metric_length(weights, found.orbit.point - exact.point)
-    return replace(found, arclength=at.arclength + way)
 
 
 def switch_at_rigid_grazing(special: SpecialPoint, times: int = 1) -> list[BranchNode]:
@@ -108,7 +115,7 @@ def switch_at_rigid_grazing(special: SpecialPoint, times: int = 1) -> list[Branc
     period = times * exact.period
     if not found:
         raise LocateError(f"no orbit of period {period} with an impact begins at {hz}")
-    nodes = [node for node in found if node is not None]
+    nodes = [_as_node(exact, orbit) for orbit in found if orbit is not None]
     if not nodes:
         raise LocateError(
             f"no orbit of period {period} is found beside the grazing at {hz}: its impacts are too "
@@ -132,8 +139,8 @@ def _shares(exact: Orbit, touches: Touches, form: RootMap, kind: Beside) -> Sequ
 
 def first_beside(
     exact: Orbit, touches: Touches, beside: Beside, shares: Sequence[float] = SLIGHT
-) -> BranchNode | None:
-    """The orbit of a kind with the first of some sizes that is found, heading away.
+) -> Corrected | None:
+    """The orbit of a kind with the first of some sizes that is found.
 
     Raises
     ------
@@ -141,7 +148,22 @@ def first_beside(
         If none can be looked for.
     """
     found = (_beside(exact, touches, beside, share) for share in shares)
-    return next((node for node in found if node is not None), None)
+    return next((orbit for orbit in found if orbit is not None), None)
+
+
+def _as_node(exact: Orbit, found: Corrected) -> BranchNode:
+    """An orbit beside a grazing as a point of a branch heading away, with its distance."""
+    orbit, base = found.orbit, exact.problem
+    times = orbit.period // exact.period
+    problem = (
+        base if times == 1 else ShootingProblem(base.flow, orbit.period, times * base.segments)
+    )
+    orbit = replace(orbit, problem=problem)
+    grazing = np.append(np.tile(exact.point[:-1], times), exact.point[-1])
+    weights = problem.metric(grazing)
+    way, along = orbit.point - grazing, found.along
+    tangent = math.copysign(1.0, along @ (weights * way)) / metric_length(weights, along) * along
+    return BranchNode(orbit, tangent, metric_length(weights, way))
 
 
 def _ahead(touches: Touches, exact: Orbit, before: Orbit) -> Beside | None:
@@ -169,14 +191,15 @@ def turned(hits: tuple[bool, ...], by: int) -> tuple[bool, ...]:
     return hits[by:] + hits[:by]
 
 
-def crosses_beside(at: Orbit, beside: Orbit) -> bool:
+def crosses_beside(at: Orbit, beside: Orbit, slightest: float = SLIGHT[-1]) -> bool:
     """Whether a multiplier crosses, or may cross, the unit circle from a grazing to an orbit by it.
 
     Without the slight impact multipliers change steadily. With it the largest tends to infinity as
     the inverse of its speed, and the others to limits by as little as the speed; that of a single
-    mode to zero, as the product of both is fixed.
+    mode to zero, as the product of both is fixed. An impact is slight up to a depth over the orbit's
+    size.
     """
-    slight = SLIGHT[-1] * length_unit(beside)
+    slight = slightest * length_unit(beside)
     if not any(0.0 < depth < slight for *_, depth in rigid_touches(beside)):
         return not accounted(at, [], beside)
     *others, largest = np.sort(np.abs(beside.multipliers))
@@ -206,9 +229,9 @@ def _slight_touches(orbit: Orbit) -> int:
     return sum(abs(depth) < least for _, _, depth in rigid_touches(orbit))
 
 
-def _beside(exact: Orbit, touches: Touches, beside: Beside, share: float) -> BranchNode | None:
-    """The orbit whose least impact or miss is a share of the grazing's size, heading away."""
-    hit, depth = np.array(beside.hits), share * length_unit(exact)
+def _beside(exact: Orbit, touches: Touches, beside: Beside, share: float) -> Corrected | None:
+    """The orbit whose least impact or miss is a share of the grazing's size."""
+    hit, depth, family = np.array(beside.hits), share * length_unit(exact), touches.family
     unit = np.where(hit, touches.omega, 1.0)
     sizes = beside.amounts / unit
     lead = int(np.argmin(np.where(hit, sizes, np.inf) if hit.any() else sizes))
@@ -220,23 +243,20 @@ def _beside(exact: Orbit, touches: Touches, beside: Beside, share: float) -> Bra
         except ConvergenceError:
             return None
         places.append(moved.unknowns(np.where(hit, amounts, 0.0)))
-    problem, times = touches.problem, touches.problem.period // exact.period
-    grazing = np.append(np.tile(exact.point[:-1], times), exact.point[-1])
-    weights = problem.metric(grazing)
+    grazing = touches.unknowns(np.zeros(hit.size))
+    weights = family.metric(grazing)
     near, far = (place - grazing for place in places)
-    if metric_length(weights, far - 2.0 * near) > PROPORTIONAL * metric_length(weights, far):
+    way = metric_length(weights, far)
+    if metric_length(weights, far - 2.0 * near) > PROPORTIONAL * way:
         return None
-    by_frequency = np.zeros(grazing.size)
-    by_frequency[-1] = 1.0
-    found = problem.correct(
-        places[1], by_frequency, longest=AS_ASKED * metric_length(weights, far),
-        max_iterations=FROM_NEAR,
+    held = np.zeros(grazing.size)
+    held[-1] = 1.0
+    found = correct(
+        family, places[1], Free(), held, float(places[1][-1]), max_iterations=FROM_NEAR,
+        first_step=AS_ASKED * way,
     )  # fmt: skip
     if not found.converged:
         return None
-    orbit = Orbit.of(problem, found, exact.observe)
-    found_depths = _depths(touches, orbit)
+    found_depths = _depths(touches, found.orbit)
     as_asked = abs(abs(found_depths[lead]) - depth) < AS_ASKED * depth
-    if not as_asked or ((found_depths > 0.0) != hit).any():
-        return None
-    return BranchNode(orbit, problem.tangent(found, far), 0.0)
+    return found if as_asked and ((found_depths > 0.0) == hit).all() else None

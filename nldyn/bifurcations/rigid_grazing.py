@@ -7,8 +7,8 @@ the speed 1. With the row c of the penetration, its height h after k periods cha
 -(1 + e) v c Aᵏ b.
 
 Of an orbit that grazes in several touches at once the same holds from each to the next. To first
-order its heights go with ln ω and with the speeds of the impacts; each touch either has an impact
-and no height, or a miss and no speed: a linear complementarity problem.
+order its heights go with the parameter x and with the speeds of the impacts; each touch either has
+an impact and no height, or a miss and no speed: a linear complementarity problem.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ class Beside:
     hits : tuple of bool
         Which touches are impacts.
     side : int
-        +1 if they exist above the frequency of the grazing, -1 below.
+        +1 if they exist above the parameter of the grazing, -1 below.
     amounts : tuple of float
-        Speeds of the impacts in m/s and clearances of the misses in m, over the relative distance
-        in frequency.
+        Speeds of the impacts in m/s and clearances of the misses in m, over the distance in
+        the parameter's coordinate: the logarithm, if it is the frequency.
     """
 
     hits: tuple[bool, ...]
@@ -57,8 +57,10 @@ class RootMap:
     ----------
     jacobians : (m, 2n, 2n)
         From each touch to the next.
-    by_log_omega : (m, 2n)
-        Derivatives of the motion there.
+    by_parameter : (m, 2n)
+        Derivatives of the motion there by the parameter's coordinate.
+    own : (m,)
+        Those of the heights of the same states.
     rows, kicks : (m, 2n)
         c and b of the touches.
     losses, decelerations : (m,)
@@ -71,7 +73,8 @@ class RootMap:
     """
 
     jacobians: Real
-    by_log_omega: Real
+    by_parameter: Real
+    own: Real
     rows: Real
     kicks: Real
     losses: Real
@@ -90,7 +93,7 @@ class RootMap:
         """
         states, phases, omega = touches.states, touches.phases, touches.omega
         flights = [
-            touches.shoot(*each) for each in zip(states, phases, touches.ends, strict=True)
+            touches.shoot(*each)[1] for each in zip(states, phases, touches.ends, strict=True)
         ]
         pace = [touches.rate(*each) for each in zip(states, phases, strict=True)]
         rows, rates = touches.rows
@@ -98,24 +101,25 @@ class RootMap:
         if not (decelerations > 0.0).all():
             raise CoefficientError("the motion does not turn at the stop")
         return cls(
-            np.array([flight.jacobians[0] for flight in flights]),
-            omega * np.array([flight.d_omega[0] for flight in flights]),
+            np.array(flights),
+            touches.by_parameter(lambda beside: beside.flights(states)),
+            touches.by_parameter(lambda beside: beside.heights),
             rows, touches.kicks, touches.losses(np.full(len(rows), SLIGHT)), decelerations,
         )  # fmt: skip
 
     @cached_property
     def heights(self) -> tuple[Real, Real]:
-        """Derivatives of the heights of periodic motions by ln ω (m,) and by the speeds (m, m)."""
+        """Derivatives of the heights of periodic motions by x (m,) and by the speeds (m, m)."""
         m, n = self.rows.shape
         matrix, right = np.eye(m * n), np.zeros((m * n, m + 1))
         for i, follows in enumerate([*range(1, m), 0]):
             before, behind = slice(i * n, (i + 1) * n), slice(follows * n, (follows + 1) * n)
             matrix[behind, before] -= self.jacobians[i]
-            right[behind, 0] = self.by_log_omega[i]
+            right[behind, 0] = self.by_parameter[i]
             right[behind, i + 1] = -self.losses[i] * (self.jacobians[i] @ self.kicks[i])
         ways = np.linalg.solve(matrix, right).reshape(m, n, m + 1)
         found = np.einsum("mn,mnk->mk", self.rows, ways)
-        return found[:, 0], found[:, 1:]
+        return found[:, 0] + self.own, found[:, 1:]
 
     def effect(self, first: int) -> float:
         """Of an impact on its own touch, a period later: c A b."""
@@ -153,10 +157,10 @@ class RootMap:
 
     def with_hits(self, hits: tuple[bool, ...]) -> Beside | None:
         """The orbits with impacts at some touches, if they begin at the grazing."""
-        by_omega, by_speed = self.heights
+        by_parameter, by_speed = self.heights
         hit, amounts = np.array(hits), np.empty(len(hits))
-        amounts[hit] = np.linalg.solve(by_speed[hit][:, hit], -by_omega[hit])
-        amounts[~hit] = -by_omega[~hit] - by_speed[~hit][:, hit] @ amounts[hit]
+        amounts[hit] = np.linalg.solve(by_speed[hit][:, hit], -by_parameter[hit])
+        amounts[~hit] = -by_parameter[~hit] - by_speed[~hit][:, hit] @ amounts[hit]
         side = int(np.sign(amounts[0]))
         if not (side * amounts > 0.0).all():
             return None

@@ -1,23 +1,24 @@
 """The motion at touches of rigid stops, by equations that are smooth through grazing.
 
-The unknowns are the states z at the touches, their phases φ and ln ω. Behind a touch, where an
-impact has taken (1 + e) v from the speed, the motion with the stops left out around the touches
-leads to the next one, that behind the last to the first. There it has the speed v and the gap open
-by d. With v > 0 and d = 0 that is an impact, with v = 0 and d > 0 a miss; where v = d = 0 at all of
+The unknowns are the states z at the touches, their phases φ and a parameter x. Behind a touch,
+where an impact has taken (1 + e) v from the speed, the motion with the stops left out around the
+touches leads to the next one, that behind the last to the first. There it has the speed v and the
+gap open by d. With v > 0 and d = 0 that is an impact, with v = 0 and d > 0 a miss; where v = d = 0 at all of
 them the orbit grazes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError
-from nldyn.flow.flow_map import Segments
+from nldyn.orbits.bordered import Evaluation, OrbitFamily
 from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.passage import Passage, shoot_past
@@ -26,6 +27,7 @@ from nldyn.system.rigid_stop import RigidStop
 
 STEPS = 8  # most of Newton's method
 SMALL = 1e-12  # its last step, relative to the orbit
+DIFFERENCE = 1e-5  # of the parameter's coordinate
 RATE = 1e-4  # forcing phase in rad over which rates of the state are differences
 AT_ONE_INSTANT = 1e-3  # rad between two touches of which the order is not followed
 
@@ -36,33 +38,41 @@ class Touches:
 
     Parameters
     ----------
-    problem : ShootingProblem
-        Of the orbit.
+    family : OrbitFamily
+        Of the orbit; with one parameter, that of which neighbouring orbits have other values.
     passages : tuple of Passage
         Where the stops are left out.
     stops : tuple of int
         Which stop each touch is of, in the order of time.
     states : (m, 2n)
-        States at the touches, before the impact if there is one.
+        States at the touches, before the impact if there is one, in the family's coordinates.
     phases : (m,)
         Forcing phases, within one period.
-    log_omega : float
-        ln ω.
+    coordinate : float
+        The parameter, on its chart.
     size : float
         Largest coordinate of the orbit: where the gap is zero those of the touch may be, too.
     """
 
-    problem: ShootingProblem
+    family: OrbitFamily
     passages: tuple[Passage, ...]
     stops: tuple[int, ...]
     states: Real
     phases: Real
-    log_omega: float
+    coordinate: float
     size: float
 
     @classmethod
-    def of(cls, orbit: Orbit, times: int = 1, grazing: Grazing | None = None) -> Touches:
+    def of(
+        cls,
+        orbit: Orbit,
+        times: int = 1,
+        grazing: Grazing | None = None,
+        family: OrbitFamily | None = None,
+    ) -> Touches:
         """Those of an orbit that grazes, run through several times; all unless a grazing is given.
+
+        Its neighbours have other frequencies, unless a family with another parameter is given.
 
         Raises
         ------
@@ -82,39 +92,68 @@ class Touches:
         phases, stops = np.array([phase for phase, _ in found]), [stop for _, stop in found]
         if np.diff(phases, append=phases[0] + full).min() < AT_ONE_INSTANT:
             raise ConvergenceError("two stops are grazed at one instant")
-        problem = ShootingProblem(base.flow, times * base.period, times * base.segments)
-        size = float(np.abs(orbit.point[:-1]).max())
-        here = cls(problem, grazing.passages, tuple(stops * times), np.empty((0, base.size)),
-                   (phases + full * np.arange(times)[:, None]).ravel(), orbit.point[-1], size)
-        nodes = base.nodes(orbit.point)
+        family = family or OrbitFamily.in_frequency(orbit)
+        point, size = family.unknowns(orbit), float(np.abs(orbit.point[:-1]).max())
+        nodes = point[: family.n_states].reshape(base.segments, -1)
+        longer = replace(family, period=times * base.period, segments=times * base.segments)
+        here = cls(
+            longer,
+            grazing.passages,
+            tuple(stops * times),
+            np.empty((0, base.size)),
+            (phases + full * np.arange(times)[:, None]).ravel(),
+            float(point[-1]),
+            size,
+        )
         places = np.searchsorted(base.phases, phases, side="right") - 1
         states = [
-            here.shoot(nodes[j], base.phases[j], phase).ends[0] if phase > base.phases[j]
+            here.end(nodes[j], base.phases[j], phase) if phase > base.phases[j]
             else nodes[j]
             for j, phase in zip(np.minimum(places, base.segments - 1), phases, strict=True)
         ]  # fmt: skip
         return replace(here, states=np.tile(states, (times, 1)))
 
+    @cached_property
+    def at(self) -> Evaluation:
+        """The family's equations at the parameter's value."""
+        return self.family.at(np.append(np.zeros(self.family.n_states), self.coordinate))
+
+    @property
+    def problem(self) -> ShootingProblem:
+        """Shooting equations at the parameter's value."""
+        return self.at.problem
+
     @property
     def omega(self) -> float:
         """Excitation frequency in rad/s."""
-        return math.exp(self.log_omega)
+        return self.at.omega
 
     @property
     def ends(self) -> Real:
         """Phases (m,) of the next touches."""
-        return np.append(self.phases[1:], self.phases[0] + 2.0 * math.pi * self.problem.period)
+        return np.append(self.phases[1:], self.phases[0] + 2.0 * math.pi * self.family.period)
 
     @property
     def rows(self) -> tuple[Real, Real]:
         """Rows (m, 2n) of the penetrations and of their rates."""
         flow, stops = self.problem.flow, list(self.stops)
-        return flow.rows[stops], flow.rate_rows[stops]
+        rows, rates = flow.rows[stops], flow.rate_rows[stops]
+        if self.at.change is None:
+            return rows, rates
+        return rows @ self.at.change[0], rates @ self.at.change[0]
+
+    @property
+    def heights(self) -> Real:
+        """Penetrations (m,) at the touches, less the gaps."""
+        gaps = [self.problem.flow.system.stops[stop].gap for stop in self.stops]
+        return np.asarray((self.rows[0] * self.states).sum(1) - gaps)
 
     @property
     def kicks(self) -> Real:
         """Changes (m, 2n) of the states by impulses that give the gaps the speed 1."""
         kicks = self.problem.flow.force_columns[:, list(self.stops)].T
+        if self.at.change is not None:
+            kicks = kicks @ self.at.change[1].T
         return np.asarray(kicks / (self.rows[1] * kicks).sum(1)[:, None])
 
     def losses(self, speeds: Real) -> Real:
@@ -130,16 +169,39 @@ class Touches:
         """States (m, 2n) behind impacts of these speeds."""
         return np.asarray(self.states - (self.losses(speeds) * speeds)[:, None] * self.kicks)
 
-    def shoot(self, state: Real, first: float, last: float) -> Segments:
-        """Carry a state from phase to phase, past the stops around the touches."""
-        phases = np.array([first, last])
-        return shoot_past(
+    def shoot(self, state: Real, first: float, last: float) -> tuple[Real, Real]:
+        """State (2n,) at another phase, past the stops around the touches; Jacobian (2n, 2n)."""
+        change, phases = self.at.change, np.array([first, last])
+        if change is not None:
+            state = change[0] @ state
+        found = shoot_past(
             self.problem, self.passages, state[None], phases, self.omega, True, size=self.size
         )
+        end, jacobian = found.ends[0], found.jacobians[0]
+        if change is None:
+            return end, jacobian
+        return change[1] @ end, change[1] @ jacobian @ change[0]
+
+    def end(self, state: Real, first: float, last: float) -> Real:
+        """State (2n,) at another phase, past the stops around the touches."""
+        return self.shoot(state, first, last)[0]
+
+    def flights(self, states: Real) -> Real:
+        """States (m, 2n) at the next touches of motions from states at these."""
+        begins = zip(states, self.phases.tolist(), self.ends.tolist(), strict=True)
+        return np.array([self.end(*each) for each in begins])
+
+    def by_parameter(self, function: Callable[[Touches], Real]) -> Real:
+        """Derivative by the parameter's coordinate of a function of the same states and phases."""
+        before, behind = (
+            function(replace(self, coordinate=self.coordinate + way * DIFFERENCE))
+            for way in (-1.0, 1.0)
+        )
+        return np.asarray((behind - before) / (2.0 * DIFFERENCE))
 
     def rate(self, state: Real, phase: float) -> Real:
         """Derivative (2n,) of the motion by the phase."""
-        near, far = (self.shoot(state, phase, phase + x).ends[0] for x in (RATE, 2.0 * RATE))
+        near, far = (self.end(state, phase, phase + x) for x in (RATE, 2.0 * RATE))
         return np.asarray((4.0 * near - 3.0 * state - far) / (2.0 * RATE))
 
     def moved(self, hits: Sequence[bool], amounts: Real, lead: int) -> tuple[Touches, Real]:
@@ -167,7 +229,7 @@ class Touches:
             moves = step[: hit.size * (n + 1)].reshape(hit.size, n + 1)
             here = replace(
                 here, states=here.states + moves[:, :n], phases=here.phases + moves[:, n],
-                log_omega=here.log_omega + float(step[hit.size * (n + 1)]),
+                coordinate=here.coordinate + float(step[hit.size * (n + 1)]),
             )  # fmt: skip
             amounts = amounts + np.insert(step[hit.size * (n + 1) + 1 :], lead, 0.0)
             if not np.abs(here.states - self.states).max() < self.size:
@@ -177,38 +239,41 @@ class Touches:
         raise ConvergenceError("no orbit was found beside the grazing")
 
     def _equations(self, hit: Real, amounts: Real, lead: int) -> tuple[Real, Real]:
-        """Newton's matrix and what is missing, for z and φ of each touch, ln ω and the amounts."""
+        """Newton's matrix and what is missing, for z and φ of each touch, x and the amounts."""
         m, n = self.states.shape
         speeds, clearances = np.where(hit, amounts, 0.0), np.where(hit, 0.0, amounts)
         after, losses, kicks = self.after(speeds), self.losses(speeds), self.kicks
         (rows, rates), ends = self.rows, self.ends
-        gaps = np.array([self.problem.flow.system.stops[stop].gap for stop in self.stops])
         size = m * (n + 2)
         by_amount = np.zeros((size, m))
-        matrix, missing = np.zeros((size, m * (n + 1) + 1)), np.empty(size)
+        matrix, reached = np.zeros((size, m * (n + 1) + 1)), np.empty((m, n))
         for i, follows in enumerate([*range(1, m), 0]):
             flight, here, there = slice(i * n, (i + 1) * n), i * (n + 1), follows * (n + 1)
-            found = self.shoot(after[i], self.phases[i], ends[i])
-            reached, jacobian = found.ends[0], found.jacobians[0]
-            missing[flight] = reached - self.states[follows]
+            reached[i], jacobian = self.shoot(after[i], self.phases[i], ends[i])
             matrix[flight, here : here + n] += jacobian
             matrix[flight, there : there + n] -= np.eye(n)
             matrix[flight, here + n] -= jacobian @ self.rate(after[i], self.phases[i])
-            matrix[flight, there + n] += self.rate(reached, ends[i])
-            matrix[flight, -1] = self.omega * found.d_omega[0]
+            matrix[flight, there + n] += self.rate(reached[i], ends[i])
             gap, pace = m * n + i, m * (n + 1) + i
-            missing[gap] = rows[i] @ self.states[i] - gaps[i] + clearances[i]
-            missing[pace] = rates[i] @ self.states[i] - speeds[i]
             matrix[gap, here : here + n], matrix[pace, here : here + n] = rows[i], rates[i]
             if hit[i]:
                 by_amount[flight, i] = -losses[i] * (jacobian @ kicks[i])
                 by_amount[pace, i] = -1.0
             else:
                 by_amount[gap, i] = 1.0
-        return np.hstack([matrix, np.delete(by_amount, lead, axis=1)]), missing
+
+        def missing(touches: Touches, reached: Real) -> Real:
+            late = reached - np.roll(self.states, -1, axis=0)
+            paces = (touches.rows[1] * self.states).sum(1)
+            return np.concatenate([late.ravel(), touches.heights + clearances, paces - speeds])
+
+        matrix[:, -1] = self.by_parameter(
+            lambda touches: missing(touches, touches.flights(touches.after(speeds)))
+        )
+        return np.hstack([matrix, np.delete(by_amount, lead, axis=1)]), missing(self, reached)
 
     def unknowns(self, speeds: Real) -> Real:
-        """Shooting unknowns (N + 1,) of the orbit with impacts of these speeds."""
+        """The family's unknowns (N + 1,) of the orbit with impacts of these speeds."""
         problem = self.problem
         full, after = 2.0 * math.pi * problem.period, self.after(speeds)
         nodes = []
@@ -216,7 +281,5 @@ class Touches:
             past = (phase - self.phases) % full
             i = int(np.argmin(past))
             begin = float(self.phases[i])
-            nodes.append(
-                self.shoot(after[i], begin, begin + past[i]).ends[0] if past[i] > 0.0 else after[i]
-            )
-        return np.append(np.ravel(nodes), self.log_omega)
+            nodes.append(self.end(after[i], begin, begin + past[i]) if past[i] > 0.0 else after[i])
+        return np.append(np.ravel(nodes), self.coordinate)

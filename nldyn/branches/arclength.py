@@ -37,8 +37,6 @@ from nldyn.orbits.impact_phases import (
 )
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import FROM_NEAR, ShootingProblem, asymmetry, metric_length, shifts
-from nldyn.system.chart import FREQUENCY, Chart
-from nldyn.system.parameters import Parameter
 
 KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes
 BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding,
@@ -137,9 +135,7 @@ def _past_impact_at_node(
     before = impact_behind_node(orbit)
     if abs(before) > near:
         return None
-    hz = orbit.frequency_hz
-    chart = Chart(Parameter(FREQUENCY), 0.5 * hz, 2.0 * hz)
-    family = replace(OrbitFamily.around(orbit, (chart,)), start=start_far_from_impacts(orbit))
+    family = replace(OrbitFamily.in_frequency(orbit), start=start_far_from_impacts(orbit))
     by_frequency = np.zeros(orbit.point.size)
     by_frequency[-1] = math.copysign(1.0, here.tangent[-1])
     try:

@@ -30,6 +30,7 @@ from nldyn.curves.marks import (
     CurveChord,
     Located,
     LocatedPoint,
+    beyond_grazing,
     grazing_at_end,
     marks_between,
 )
@@ -583,12 +584,17 @@ def _followed(
             end, origin = points[-1], points[0]
             if leg is backward:
                 end, origin = origin.reversed(), end.reversed()
-            walk = CurveWalk(end, options or ContinuationOptions(), origin)
-            for point in walk:
-                leg.append(point)
-                if progress is not None:
-                    progress(point.values)
-                keeper.offer()
+            begin: CurvePoint | None = end
+            while begin is not None:
+                walk = CurveWalk(begin, options or ContinuationOptions(), origin)
+                for point in walk:
+                    leg.append(point)
+                    if progress is not None:
+                        progress(point.values)
+                    keeper.offer()
+                begin = None
+                if len(leg) > 1 and walk.stop_reason.ending is Ending.GRAZES_RIGID:
+                    begin = beyond_grazing(leg[-1])
             if leg is forward:
                 last = walk.stop_reason
             else:

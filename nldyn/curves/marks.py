@@ -10,16 +10,31 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, LocateError, check_whole
+from nldyn.bifurcations.beyond_rigid_grazing import (
+    SLIGHT,
+    SLIGHT_BY_DIFFERENCES,
+    crosses_beside,
+    orbit_beyond,
+)
 from nldyn.bifurcations.point import check_special
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import leaves_circle
 from nldyn.bifurcations.touching import Touch, touching_extremes
+from nldyn.branches.arclength import grazing_between
 from nldyn.curves.codimension_two import is_torus, torus_pair
 from nldyn.curves.point import CurvePoint, between, clear_of_nodes, curve_point
 from nldyn.curves.walk import UNFOLDED, is_torus_curve
 from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, length_unit
-from nldyn.orbits.conditions import Both, BranchPointCondition, Grazing, Singular, defined_by
+from nldyn.orbits.conditions import (
+    Both,
+    BranchPointCondition,
+    Grazing,
+    Singular,
+    defined_by,
+    grazing_beside,
+)
 from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.shooting import metric_length
 from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.system.parameters import Parameter
 
@@ -171,6 +186,8 @@ class CurveChord:
 
 def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
     """What is met between two neighbouring points of a curve, in order, and what may be missing."""
+    if isinstance(a.condition, Free) and grazing_between(a.orbit, b.orbit):
+        return _across_grazing(a, b)
     a, b = clear_of_nodes(a, b)
     chord = CurveChord(a, b)
     found: list[tuple[float, LocatedPoint]] = []
@@ -203,8 +220,44 @@ def grazing_at_end(end: CurvePoint) -> list[LocatedPoint]:
     """The grazing of a rigid stop at which a curve of orbits in one parameter ends."""
     if not isinstance(end.condition, Free):
         return []
-    mark = _marked("GR", end, end.found.step)
-    return [mark]
+    return [_rigid_grazing(end)]
+
+
+def _rigid_grazing(beside: CurvePoint) -> LocatedPoint:
+    """The grazing of a rigid stop beside a point of a curve in one parameter; else the point."""
+    family = beside.found.at.family
+    found = grazing_beside(beside.orbit, family) or beside.found
+    return LocatedPoint(
+        "GR", found.orbit, (family.charts[0].parameter,), found.at.values,
+        found.residual(found.condition), found.step,
+    )  # fmt: skip
+
+
+def beyond_grazing(end: CurvePoint) -> CurvePoint | None:
+    """Where a curve of orbits in one parameter goes on behind a grazing of a rigid stop."""
+    if not isinstance(end.condition, Free):
+        return None
+    family, grazing = end.found.at.family, grazing_beside(end.orbit, end.found.at.family)
+    if grazing is None:
+        return None
+    found = orbit_beyond(grazing.orbit, end.orbit, family)
+    if found is None:
+        return None
+    weights = family.metric(end.point)
+    ways = grazing.at.point - end.point, found.at.point - grazing.at.point
+    length = end.arclength + sum(metric_length(weights, way) for way in ways)
+    return curve_point(found, end.condition, ways[1], length)
+
+
+def _across_grazing(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
+    """The grazing of a rigid stop between two points of orbits with and without its impact."""
+    grazing = _rigid_grazing(a)
+    notes = []
+    slightest = (SLIGHT if a.found.at.family.is_exact else SLIGHT_BY_DIFFERENCES)[-1]
+    if any(crosses_beside(grazing.orbit, side.orbit, slightest) for side in (a, b)):
+        why = "multipliers may cross the unit circle right beside the grazing"
+        notes.append(_missing("a special point", a, why))
+    return [grazing], notes
 
 
 def _touched(touches: Sequence[Touch], chord: CurveChord) -> tuple[float, LocatedPoint]:

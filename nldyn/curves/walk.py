@@ -17,6 +17,7 @@ from nldyn.branches.arclength import (
     GRAZES,
     SLIGHTEST,
     grazes_rigid,
+    grazing_between,
     loses_impact,
 )
 from nldyn.branches.endings import Ending, StopReason
@@ -31,7 +32,7 @@ from nldyn.curves.point import (
     on_chart_plane,
     on_plane,
 )
-from nldyn.orbits.bordered import Condition, correct, nearest_depth
+from nldyn.orbits.bordered import Condition, Free, correct, nearest_depth
 from nldyn.orbits.conditions import BranchPointCondition, Grazing, Held, Singular
 from nldyn.orbits.impact_phases import nodes_to_impacts, start_far_from_impacts
 from nldyn.orbits.shooting import FROM_NEAR, metric_length
@@ -44,6 +45,7 @@ SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)  # of a step that leads over a phase of shoo
 # The condition of a Neimark-Sacker point holds for neutral saddles, too, and some may be near: the
 # cosine of the pair's angle changes by no more than this from point to point.
 TURN = 0.1
+DIFFERENCED = 1e-3  # slightest impact that is followed where differences serve as derivatives
 
 
 def _grazes_rigid(here: CurvePoint, least: float, most: float) -> StopReason | None:
@@ -121,7 +123,7 @@ class CurveWalk:
                 yield from last
                 return
             yield there
-            if grazes := _grazes_rigid(there, 0.0, SLIGHTEST):
+            if grazes := _grazes_rigid(there, 0.0, self._slightest):
                 self.stop_reason = grazes
                 return
             if is_torus_curve(there.condition):
@@ -197,6 +199,8 @@ class CurveWalk:
             cosine = cosine_near(there.orbit.multipliers, self._cosine)
             if abs(cosine - self._cosine) > TURN:  # a neutral saddle, or another pair
                 return None
+        if isinstance(here.condition, Free) and grazing_between(here.orbit, there.orbit):
+            return None  # the curve with the impact and that without meet in a corner
         touched = there.orbit.impacts != here.orbit.impacts
         grazes = isinstance(here.condition, Grazing)
         if touched and not grazes:
@@ -215,7 +219,13 @@ class CurveWalk:
         if isinstance(here.condition, Held) and here.condition.changes_extreme(here.orbit):
             return Ending.OTHER_EXTREME.told()
         short = Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
-        return _grazes_rigid(here, -GRAZES, GRAZES) or short
+        near = max(GRAZES, self._slightest)
+        return _grazes_rigid(here, -near, near) or short
+
+    @property
+    def _slightest(self) -> float:
+        """Slightest impact with a rigid stop that is followed, its depth over the orbit's size."""
+        return SLIGHTEST if self.start.found.at.family.is_exact else DIFFERENCED
 
     def _left_at_once(self) -> str:
         """Name of a parameter at the end of its range, beyond which the curve would begin."""

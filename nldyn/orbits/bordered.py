@@ -33,6 +33,7 @@ from nldyn.system.chart import (
     with_value,
 )
 from nldyn.system.parameters import Parameter
+from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.system import System
 
 # A central difference of a function g with the error ε errs by ε/h + h² g(3)/6. Monodromy matrices
@@ -47,6 +48,7 @@ from nldyn.system.system import System
 # so does what the flow map errs by, and rounding of 1e-13 allows short differences.
 DIFFERENCE = 1e-4
 END_DIFFERENCE = 1e-6
+OF_SQUARE, LEAST_END_DIFFERENCE = 0.02, 1e-9  # beside a slight impact, of its depth's square
 LARGEST_CHANGE = 1e-3
 SHORTEST_DIFFERENCE = 1e-7
 BENT, SHORTEST_BEND = 0.02, 3e-6
@@ -112,6 +114,12 @@ class OrbitFamily:
             charts,
         )
 
+    @classmethod
+    def in_frequency(cls, orbit: Orbit) -> OrbitFamily:
+        """That in the excitation frequency alone, up to an octave away."""
+        hz = orbit.frequency_hz
+        return cls.around(orbit, (Chart(Parameter(FREQUENCY), 0.5 * hz, 2.0 * hz),))
+
     def unfolded(self, direction: Real) -> OrbitFamily:
         """The family with a direction added to its equations."""
         return replace(self, unfolding=direction)
@@ -119,6 +127,13 @@ class OrbitFamily:
     def past(self, passages: tuple[Passage, ...]) -> OrbitFamily:
         """The family of motions past rigid stops."""
         return self if passages == self.passages else replace(self, passages=passages)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the flow map differentiates by all parameters, so that no differences do."""
+        return all(
+            has_exact_derivatives(c.parameter) or c.parameter.name == FREQUENCY for c in self.charts
+        )
 
     @property
     def n_states(self) -> int:
@@ -213,7 +228,7 @@ class Evaluation:
         return 2.0 * math.pi * hz
 
     @cached_property
-    def _change(self) -> tuple[Real, Real] | None:
+    def change(self) -> tuple[Real, Real] | None:
         """Matrices from the coordinates of the family's system to those here, and back."""
         here, start = self.problem.flow.system.linear, self.family.system.linear
         if here is start:
@@ -224,7 +239,7 @@ class Evaluation:
     def nodes(self) -> Real:
         """States (k, 2n) in the coordinates of the changed system."""
         nodes = self.point[: self.family.n_states].reshape(self.family.segments, -1)
-        return nodes if self._change is None else nodes @ self._change[0].T
+        return nodes if self.change is None else nodes @ self.change[0].T
 
     @cached_property
     def segments(self) -> Segments:
@@ -240,7 +255,7 @@ class Evaluation:
 
     def _back(self, ends: Real) -> Real:
         """Vectors (k, 2n) in the coordinates of the family's system."""
-        return ends if self._change is None else ends @ self._change[1].T
+        return ends if self.change is None else ends @ self.change[1].T
 
     def _ends(self) -> Real:
         return self._back(self._shot(False).ends)
@@ -261,8 +276,8 @@ class Evaluation:
         family = self.family
         n, k, size = family.n_states, family.segments, 2 * family.system.size
         blocks = self.segments.jacobians
-        if self._change is not None:
-            blocks = self._change[1] @ blocks @ self._change[0]
+        if self.change is not None:
+            blocks = self.change[1] @ blocks @ self.change[0]
         matrix = np.zeros((n, n + family.n_free))
         for j in range(k):
             rows = slice(j * size, (j + 1) * size)
@@ -288,9 +303,17 @@ class Evaluation:
     def _difference(self, place: int) -> Real:
         """Derivative of the ends by a parameter, from the maps of two changed systems."""
         step = np.zeros(self.point.size)
-        step[place] = END_DIFFERENCE
+        step[place] = self._end_difference
         before, after, length = _pair(self, step, Evaluation._ends)
-        return np.asarray((after - before).ravel() / (length * END_DIFFERENCE))
+        return np.asarray((after - before).ravel() / (length * self._end_difference))
+
+    @cached_property
+    def _end_difference(self) -> float:
+        """Over which ends are differenced; the speed of an impact goes with the root of a way."""
+        if not any(isinstance(stop, RigidStop) for stop in self.family.system.stops):
+            return END_DIFFERENCE
+        way = OF_SQUARE * nearest_depth(self.orbit) ** 2
+        return min(max(way, LEAST_END_DIFFERENCE), END_DIFFERENCE)
 
     @cached_property
     def orbit(self) -> Orbit:

@@ -27,9 +27,7 @@ from nldyn.orbits.harmonics import line_by_balance
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.passage import Passage, peak_past
 from nldyn.orbits.shooting import metric_length
-from nldyn.system.chart import FREQUENCY, Chart
 from nldyn.system.loads import BaseMotion, ConstantForce, HarmonicForce, Unbalance
-from nldyn.system.parameters import Parameter
 from nldyn.system.rigid_stop import RigidStop, touched_sharply
 from nldyn.system.stop import Stop
 from nldyn.system.system import System
@@ -629,7 +627,13 @@ def nearest_flip(orbit: Orbit) -> Orbit | None:
 
 
 def nearest_grazing(orbit: Orbit) -> Orbit | None:
-    """The grazing beside an orbit, by its defining system; without the slight impact.
+    """The grazing beside an orbit, by its defining system; without the slight impact."""
+    found = grazing_beside(orbit, OrbitFamily.in_frequency(orbit))
+    return None if found is None else replace(found.orbit, problem=orbit.problem)
+
+
+def grazing_beside(orbit: Orbit, family: OrbitFamily) -> Corrected | None:
+    """The grazing of a rigid stop in a family with one parameter, without the slight impact.
 
     Where several touches graze at once, without any of these.
     """
@@ -639,12 +643,12 @@ def nearest_grazing(orbit: Orbit) -> Orbit | None:
     except SystemModelError:
         return None
     for grazing in (together, alone) if together.others else (alone,):
-        found = _solved(orbit, grazing.defined)
+        found = _solved(orbit, family, grazing.defined)
         if found is None:
             continue
         try:
             grazing.grazing_too(found.orbit)
-            return replace(found.orbit, problem=orbit.problem)
+            return found
         except ConvergenceError:
             continue
     return None
@@ -652,17 +656,16 @@ def nearest_grazing(orbit: Orbit) -> Orbit | None:
 
 def _beside(kind: str, orbit: Orbit, first_step: float = math.inf) -> Corrected | None:
     """The special point of a kind beside an orbit."""
-    return _solved(orbit, partial(defined_by, kind), first_step)
+    return _solved(orbit, OrbitFamily.in_frequency(orbit), partial(defined_by, kind), first_step)
 
 
 def _solved(
     orbit: Orbit,
+    family: OrbitFamily,
     define: Callable[[OrbitFamily, Orbit], tuple[OrbitFamily, Condition]],
     first_step: float = math.inf,
 ) -> Corrected | None:
     """What meets a condition beside an orbit, in the family in which that is solved."""
-    hz = orbit.frequency_hz
-    family = OrbitFamily.around(orbit, (Chart(Parameter(FREQUENCY), 0.5 * hz, 2.0 * hz),))
     try:
         family, condition = define(family, orbit)
         guess = family.unknowns(orbit)

@@ -18,6 +18,7 @@ from nldyn import (
     continue_branch,
     continue_orbit,
     continue_special,
+    impacts,
     load,
     normal_form,
     save,
@@ -25,6 +26,7 @@ from nldyn import (
 )
 from nldyn.branches.endings import Ending
 from nldyn.curves import refine_special
+from nldyn.system.chart import checked_parameter, with_value
 
 DAMPING, RESTITUTION, GAP = 0.1, 0.8, 0.3
 TURN = 2.0 * math.pi
@@ -133,20 +135,76 @@ def test_a_second_impact_grazes_where_the_closed_form_says(periods, start_hz, be
     assert min(abs(hz / touch - 1.0) for hz in found) < 1e-10
 
 
-@pytest.fixture(scope="module")
-def in_frequency():
-    """The branch again, followed as a curve: the impact passes the shooting phase zero on it."""
-    return continue_orbit(solve_orbit(oscillator(), 0.27), "frequency_hz", (0.05, 0.8))
-
-
-def test_a_curve_goes_on_where_an_impact_passes_a_phase_of_shooting(branch, in_frequency):
-    marks = [(mark.kind, mark.values[0]) for mark in in_frequency.marks]
-    assert [kind for kind, _ in marks] == ["GR", "PD", "GR"]
-    on_branch = [special.frequency_hz for special in branch.special_points[1:]]
+def test_a_curve_goes_on_where_an_impact_passes_a_phase_of_shooting(branch):
+    """The branch again, followed as a curve; both go on across two grazings."""
+    curve = continue_orbit(solve_orbit(oscillator(), 0.27), "frequency_hz", (0.13, 0.4))
+    marks = [(mark.kind, mark.values[0]) for mark in curve.marks]
+    assert [kind for kind, _ in marks] == ["LP", "GR", "PD", "GR"]
+    on_branch = [special.frequency_hz for special in branch.special_points]
     assert [value for _, value in marks] == pytest.approx(on_branch, rel=1e-10)
-    reasons = [reason.ending for reason in in_frequency.stop_reasons]
-    assert reasons == [Ending.GRAZES_RIGID, Ending.GRAZES_RIGID]
-    assert not in_frequency.notes
+    reasons = {reason.ending for reason in curve.stop_reasons}
+    assert reasons == {Ending.PARAMETER_RANGE_END}
+    assert not curve.notes
+
+
+def response(hz, natural_hz=1.0 / TURN, ratio=0.5 * DAMPING):
+    """Amplitude with another frequency and damping ratio of the mode."""
+    omega, natural = TURN * hz, TURN * natural_hz
+    return 1.0 / abs(natural**2 - omega**2 + 2j * ratio * natural * omega)
+
+
+# excitation frequency, range, and what is zero where the linear response reaches the stop
+ACROSS = {
+    "gap": (0.27, (0.3, 1.5), lambda gap: response(0.27) - gap),
+    "amplitude": (0.27, (0.2, 1.0), lambda force: force * response(0.27) - GAP),
+    "modal_damping": (0.27, (0.6, 1.0), lambda ratio: response(0.27, ratio=ratio) - GAP),
+    "natural_frequency_hz": (0.27, (0.392, 0.41), lambda hz: response(0.27, natural_hz=hz) - GAP),
+}
+
+
+@pytest.mark.parametrize("name", ACROSS)
+def test_a_curve_in_any_parameter_goes_on_across_a_grazing(name):
+    """From the orbit with the impact, and from the one without."""
+    hz, (low, high), room_left = ACROSS[name]
+    touch = brentq(room_left, low, high, xtol=1e-15)
+    for value in (low, high):
+        system = with_value(oscillator(), checked_parameter(oscillator(), name), value)
+        curve = continue_orbit(solve_orbit(system, hz), name, (low, high))
+        (graze,) = [mark for mark in curve.marks if mark.kind == "GR"]
+        assert graze.values[0] == pytest.approx(touch, rel=1e-9)
+        assert {reason.ending for reason in curve.stop_reasons} == {Ending.PARAMETER_RANGE_END}
+        assert {point.orbit.impacts for point in curve.points} == {0, 1}
+
+
+def test_a_curve_goes_on_where_two_stops_are_grazed_at_once():
+    """Between two equal stops, behind which the orbit has an impact at each."""
+    system = oscillator()
+    both = [RigidStop("x", RESTITUTION, GAP, direction) for direction in (1, -1)]
+    orbit = solve_orbit(system.with_elements(stops=tuple(both)), 0.45)
+    curve = continue_orbit(orbit, "amplitude", (0.9, 3.0))
+    assert [mark.kind for mark in curve.marks] == ["GR"]
+    assert curve.marks[0].values[0] == pytest.approx(GAP / response(0.45), rel=1e-10)
+    assert {point.orbit.impacts for point in curve.points} == {0, 2}
+    assert {reason.ending for reason in curve.stop_reasons} == {Ending.PARAMETER_RANGE_END}
+
+
+def test_orbits_behind_a_grazing_in_the_gap_are_those_of_the_closed_form(tmp_path):
+    """They lie on the same side as those without; the curve is extended across it from a file."""
+    short = continue_orbit(solve_orbit(oscillator(), 0.27), "gap", (0.3, 0.8))
+    save(short, tmp_path / "curve.h5")
+    (again,) = load(tmp_path / "curve.h5")
+    curve = again.extend([(0.3, 1.5)])
+    omega = TURN * 0.27
+    hit = [point for point in curve.points if point.orbit.impacts]
+    slightest = min(impacts(point.orbit).speed[0] for point in hit)
+    assert slightest < 1e-4 * GAP * omega
+    for point in hit:
+        speeds = [motion.speed for motion in exact(float(point.values[0])).motions(omega, 1)]
+        speed = impacts(point.orbit).speed[0]
+        fastest = point.orbit.max_abs_displacement * omega
+        assert min(abs(speed**2 - v**2) for v in speeds) < 1e-10 * fastest**2
+    assert [mark.kind for mark in short.marks] == []
+    assert [mark.kind for mark in curve.marks] == ["LP", "GR"]
 
 
 def test_a_curve_of_folds_is_that_of_the_closed_form():

@@ -280,9 +280,7 @@ def test_spins_that_make_no_sense_are_refused():
     with pytest.raises(SystemModelError, match="spin has matrices of 3 rows, the system 2"):
         System.from_matrices(np.eye(2), np.eye(2), PLACES, spin=Spin(1.0, np.zeros((3, 3))))
     start = nldyn.solve_orbit(disc(), 0.1)
-    with pytest.raises(
-        SystemModelError, match=r"spins at 0\.19.* Hz, but the excitation"
-    ):
+    with pytest.raises(SystemModelError, match=r"spins at 0\.19.* Hz, but the excitation"):
         nldyn.continue_orbit(start, "speed_hz", (0.1, 0.2))
     still = nldyn.solve_orbit(rotor(excitation=[Unbalance("x", 0.02)]), 0.1)
     with pytest.raises(SystemModelError, match="'spin_hz': the system has no spin"):
