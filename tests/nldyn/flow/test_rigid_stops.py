@@ -6,14 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from event_driven import MOST_HITS, PiecewiseLinear, integrate
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from nldyn import (
+    BaseMotion,
     ConstantForce,
+    Damper,
     FlowMap,
     HarmonicForce,
     Parameter,
+    PolynomialSpring,
     RigidStop,
+    Spring,
     Stop,
     System,
     SystemModelError,
@@ -21,9 +26,11 @@ from nldyn import (
     simulate,
 )
 from nldyn.orbits.starts import random_states
+from nldyn.system import CubicDamper
 
 G = 9.81
-PERIOD = np.array([0.0, 2.0 * np.pi])
+TURN = 2.0 * np.pi
+PERIOD = np.array([0.0, TURN])
 
 
 def ball(restitution, table=0.0, frequency_hz=10.0):
@@ -197,6 +204,70 @@ def test_sensitivities_are_those_of_differences(name):
     by_start, by_omega = differences(system, start, 1.7, 2.0 * PERIOD)
     size = np.abs(found.jacobians).max()
     assert np.abs(found.jacobians[0] - by_start).max() < 3e-8 * size
+    assert np.abs(found.d_omega[0] - by_omega).max() < 3e-8 * np.abs(by_omega).max()
+
+
+GYROSCOPIC, CIRCULATORY = np.array([[0.0, 0.3], [-0.3, 0.0]]), np.array([[0.0, 0.2], [-0.2, 0.0]])
+BASE = np.array([1.0, 0.6])  # load vector, in kg
+
+
+def beside_all_elements():
+    """Two masses with a rigid and an elastic stop, springs, dampers, skew matrices and loads."""
+    return System.from_matrices(
+        np.eye(2), K2, {"a": [1.0, 0.0], "b": [0.0, 1.0]}, damping=0.05 * K2,
+        gyroscopic=GYROSCOPIC, circulatory=CIRCULATORY, loads={"base": BASE},
+        stops=[RigidStop("a", 0.7, 0.1), Stop("b", 50.0, 1.5, 0.3, direction=-1)],
+        springs=[PolynomialSpring("a", [-0.5, 0.0, 2.0], "b"), Spring("b", 0.4)],
+        dampers=[Damper("a", 0.1, "b"), CubicDamper("b", 0.3)],
+        excitation=[
+            HarmonicForce("a", 1.0), HarmonicForce("b", 0.4, 30.0, harmonic=2),
+            ConstantForce("a", 0.2), BaseMotion("base", 0.3),
+        ],
+    )  # fmt: skip
+
+
+def rate_beside_all_elements(t, y, omega):
+    """The same by hand."""
+    x, v = y[:2], y[2:]
+    apart, beneath = x[0] - x[1], max(-x[1] - 0.3, 0.0)
+    between = -0.5 * apart + 2.0 * apart**3 + 0.1 * (v[0] - v[1])
+    force = -K2 @ x - 0.05 * K2 @ v - GYROSCOPIC @ v - CIRCULATORY @ x
+    force += BASE * 0.3 * omega**2 * math.cos(omega * t)
+    force[0] += math.cos(omega * t) + 0.2 - between
+    force[1] += 0.4 * math.cos(2.0 * omega * t + math.pi / 6.0) + between
+    force[1] += 50.0 * beneath**1.5 - 0.4 * x[1] - 0.3 * v[1] ** 3
+    return np.concatenate([v, force])
+
+
+def test_impacts_beside_all_elements_are_those_of_runge_kutta():
+    system, omega = beside_all_elements(), 1.7
+    flow = FlowMap(system)
+
+    def reaches(t, y):
+        return y[0] - 0.1
+
+    reaches.terminal, reaches.direction = True, 1
+    x, v = [0.05, 0.1], [0.3, -0.2]
+    t, y, hits, last = 0.0, np.array([*x, *v]), 0, 2.0 * TURN / omega
+    while t < last:
+        run = solve_ivp(
+            lambda t, y: rate_beside_all_elements(t, y, omega), (t, last), y, "DOP853",
+            events=reaches, rtol=1e-12, atol=1e-13, max_step=0.02,
+        )  # fmt: skip
+        t, y = run.t[-1], run.y[:, -1].copy()
+        if run.status:
+            hits += 1
+            y[2] *= -0.7
+    start = flow.to_state(flow_start(system, x, v))
+    found = flow.shoot(start[None], 2.0 * PERIOD, omega)
+    assert hits > 2
+    assert found.closings.tolist() == [hits, 2]
+    rows = np.array([system.participation[name] for name in "ab"])
+    q = flow.to_modal(found.ends)[0]
+    growth = max(np.abs(found.jacobians).max(), 1.0)
+    assert np.abs(np.append(rows @ q[:2], rows @ q[2:]) - y).max() < 1e-9 * growth
+    by_start, by_omega = differences(system, start, omega, 2.0 * PERIOD)
+    assert np.abs(found.jacobians[0] - by_start).max() < 3e-8 * growth
     assert np.abs(found.d_omega[0] - by_omega).max() < 3e-8 * np.abs(by_omega).max()
 
 
