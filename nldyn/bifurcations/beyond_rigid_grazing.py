@@ -196,8 +196,8 @@ def crosses_beside(at: Orbit, beside: Orbit, slightest: float = SLIGHT[-1]) -> b
 
     Without the slight impact multipliers change steadily. With it the largest tends to infinity as
     the inverse of its speed, and the others to limits by as little as the speed; that of a single
-    mode to zero, as the product of both is fixed. An impact is slight up to a depth over the orbit's
-    size.
+    mode to zero, as the product of both is fixed. An impact is slight up to a share of the
+    orbit's size.
     """
     slight = slightest * length_unit(beside)
     if not any(0.0 < depth < slight for *_, depth in rigid_touches(beside)):

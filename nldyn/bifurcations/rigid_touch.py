@@ -3,8 +3,8 @@
 The unknowns are the states z at the touches, their phases φ and a parameter x. Behind a touch,
 where an impact has taken (1 + e) v from the speed, the motion with the stops left out around the
 touches leads to the next one, that behind the last to the first. There it has the speed v and the
-gap open by d. With v > 0 and d = 0 that is an impact, with v = 0 and d > 0 a miss; where v = d = 0 at all of
-them the orbit grazes.
+gap open by d. With v > 0 and d = 0 that is an impact, with v = 0 and d > 0 a miss; where v = d = 0
+at all of them the orbit grazes.
 """
 
 from __future__ import annotations
