@@ -823,6 +823,12 @@ def render(
     metavar="LIST",
     help="Meshes to compare: files with the names of the scene's, from coarse to fine.",
 )
+@click.option(
+    "--components",
+    metavar="LIST",
+    help="Joined components whose modes are varied, the others as in the scene; by default "
+    "all that have a [reduction].",
+)
 @click.option("--at-hz", type=click.FloatRange(1e-6, 1e12), metavar="HZ", help="Orbit to compare.")
 @click.option("--full", is_flag=True, help="Find this orbit in the full model, too (minutes).")
 @quiet_option
@@ -836,6 +842,7 @@ def converge(
     methods: str,
     refinements: list[int] | None,
     meshes: str | None,
+    components: str | None,
     at_hz: float | None,
     full: bool,
     quiet: bool,
@@ -861,6 +868,7 @@ def converge(
                 methods=[name.strip() for name in methods.split(",")],
                 refinements=refinements or [1],
                 meshes=[name.strip() for name in meshes.split(",")] if meshes else (),
+                components=[name.strip() for name in components.split(",")] if components else (),
                 at_hz=at_hz,
                 full=full,
                 progress=report,

@@ -12,26 +12,28 @@ import cms
 from nldyn.base.errors import SystemModelError
 from nldyn.reduction.load_case import LoadCase
 from nldyn.reduction.model_errors import (
-    ALL_MODES_UP_TO,
     Errors,
     Measured,
     best_of,
     counted_modes,
     errors_of,
-    is_full,
     largest_force,
     measured,
     measured_linear,
-    most_modes,
-    receptance_bound,
-    reductions,
-    reference_model,
     with_orbit,
+)
+from nldyn.reduction.studied import (
+    ALL_MODES_UP_TO,
+    Alone,
+    JoinedComponents,
+    Studied,
+    receptance_bound,
 )
 from nldyn.runtime.executors import as_finished, own_processes
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.runtime.threads import one_thread
 
+Component = cms.ComponentLike | JoinedComponents
 COUNTS = (*range(1, 11), 12, 16, 20, 30, 40)
 ONE_MODE = 4.0  # part of the cost of a branch that does not grow with its modes, in modes
 EXACT = 1e-6  # relative difference of frequencies that are the same but for rounding
@@ -70,6 +72,8 @@ class ConvergenceStudy:
         Bound, but for rounding, of the reference's own error: of the receptance without damping,
         relative as in `Errors`. 0 for the full model; inf if a mode left out may resonate in the
         range.
+    counted : str
+        What the numbers of modes mean, of components that are joined.
     """
 
     setting: LoadCase
@@ -78,6 +82,7 @@ class ConvergenceStudy:
     errors: tuple[Errors, ...]
     best: Measured
     reference_error: float = 0.0
+    counted: str = ""
 
     def __repr__(self) -> str:
         """One line: how many models, and at which frequency their orbits are compared."""
@@ -236,6 +241,7 @@ class ConvergenceStudy:
         return (
             f"reference: {self._whole()} for eigenfrequencies and receptance{orbit}, {largest} for "
             f"the rest; orbits at {self.at_hz:g} Hz\n{own}"
+            + (f"\n{self.counted}" if self.counted else "")
         )
 
     def _whole(self) -> str:
@@ -248,6 +254,7 @@ class ConvergenceStudy:
             )
         else:
             own = "without a bound of its error: a mode that it leaves out may lie in the range"
+            own += ", or a joint may follow from others" if self.counted else ""
         return f"rubin with {counted_modes(self.reference)} ({own})"
 
     def said_of(
@@ -294,7 +301,7 @@ class ConvergenceStudy:
 
 
 def convergence_study(
-    components: Mapping[str, cms.ComponentLike] | cms.ComponentLike,
+    components: Mapping[str, Component] | Component,
     setting: LoadCase,
     *,
     modes: Sequence[int] | None = None,
@@ -308,13 +315,14 @@ def convergence_study(
 
     Parameters
     ----------
-    components : ComponentLike or mapping of str to ComponentLike
-        The component, or the same on several meshes by name, the finest last.
+    components : ComponentLike, JoinedComponents, or mapping of str to one of these
+        The component, or several that are joined; the same on several meshes by name, the finest
+        last.
     setting : LoadCase
         What acts on it and what range is asked for.
     modes : sequence of int, optional
         Numbers of kept component modes; by default those of 1 to 10, 12, 16, 20, 30 and 40 that
-        every component and method can keep.
+        every mesh and method can keep. Of joined components each keeps so many, or all it has.
     methods : sequence of str
         Names as for `cms.reduce`. By "macneal" interfaces have no mass, so that there is no
         equation of motion with a stop: only the linear numbers are compared.
@@ -351,31 +359,34 @@ def convergence_study(
     The harmonic branch is followed downwards from the orbit that a simulation from rest finds at
     the upper end of the range.
     """
-    if not isinstance(components, Mapping):
-        components = {"": components}
-    if not components or (modes is not None and not modes) or not methods:
+    given = components if isinstance(components, Mapping) else {"": components}
+    studied: dict[str, Studied] = {
+        name: each if isinstance(each, JoinedComponents) else Alone(each)
+        for name, each in given.items()
+    }
+    if not studied or (modes is not None and not modes) or not methods:
         raise SystemModelError("converge: give at least one component, count and method")
     at_hz = setting.middle_hz if at_hz is None else at_hz
     if not setting.range_hz[0] <= at_hz <= setting.range_hz[1]:
         raise SystemModelError(f"converge: at_hz must lie in the range, got {at_hz:g}")
-    mesh, finest = list(components.items())[-1]
-    if full and finest.mass.shape[0] > ALL_MODES_UP_TO:
+    mesh, finest = list(studied.items())[-1]
+    if full and finest.dofs > ALL_MODES_UP_TO:
         raise SystemModelError(
             f"converge: full is for components with up to {ALL_MODES_UP_TO} degrees of freedom, "
-            f"this one has {finest.mass.shape[0]}"
+            f"this one has {finest.dofs}"
         )
-    most = min(most_modes(component, methods) for component in components.values())
-    wanted = modes or counts_up_to(most)
-    whole = reference_model(finest, max(wanted))
+    wanted = modes or counts_up_to(min(each.most_modes(methods) for each in studied.values()))
+    known = finest.reference(max(wanted))
     if modes is None:
-        wanted = [count for count in wanted if count >= whole.rigid_body_modes] or [max(wanted)]
-    linear = measured_linear("", FULL if is_full(whole) else REFERENCE, whole, setting)
+        wanted = [count for count in wanted if count >= known.fewest] or [max(wanted)]
+    whole = known.whole
+    linear = measured_linear("", FULL if known.full else REFERENCE, whole, setting)
     counts = sorted(set(wanted))
     cases = [
         (name, reduced)
-        for name, component in components.items()
+        for name, each in studied.items()
         for method in methods
-        for reduced in reductions(component, counts, method)
+        for reduced in each.reductions(counts, method)
     ]
     shares = Shares(progress or silent, {str(k): _cost(case[1]) for k, case in enumerate(cases)})
     models = _measured_all(cases, setting, at_hz, shares, jobs)
@@ -385,8 +396,8 @@ def convergence_study(
         linear = with_orbit(linear, whole, setting, best.orbit, shares.part(FULL))
     models.append(linear)
     errors = tuple(errors_of(model, linear, best, full) for model in models)
-    known = 0.0 if is_full(whole) else receptance_bound(finest, whole, linear, setting)
-    return ConvergenceStudy(setting, at_hz, tuple(models), errors, best, known)
+    error = 0.0 if known.full else receptance_bound(finest, known, linear, setting)
+    return ConvergenceStudy(setting, at_hz, tuple(models), errors, best, error, finest.counted)
 
 
 def counts_up_to(most: int) -> list[int]:

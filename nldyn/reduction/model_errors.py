@@ -29,8 +29,6 @@ LONGEST_SEARCH = 600.0  # s of processor time for the orbit with which a harmoni
 EIGENFREQUENCIES = 3
 SPECIAL_KINDS = ("LP", "PD")
 MATCH = 0.02  # special points of one kind farther apart are not the same
-INVISIBLE = 1e-9
-ALL_MODES_UP_TO = 1500  # degrees of freedom; of larger components the reference is reduced, too
 FEWEST_REFERENCE_MODES = 40
 MASSLESS = "its interfaces have no mass, so that a stop has no equation of motion"
 MOVED = 1.001  # times an orbit: the start from which the time of Newton's method is measured
@@ -211,28 +209,12 @@ def reductions(
     return [*fewer, largest]
 
 
-def reference_model(component: cms.ComponentLike, modes: int) -> cms.ReducedModel:
-    """All modes of a component that an interface sees; of a large one more than a study's."""
+def reference_model(component: cms.ComponentLike, modes: int, full: bool) -> cms.ReducedModel:
+    """All modes of a component that an interface sees, or a model of more than a study's."""
+    if full:
+        return cms.reduce(component, modes=most_modes(component, ()), method="truncation")
     size = int(component.mass.shape[0])
-    if size <= ALL_MODES_UP_TO:
-        count = most_modes(component, ())
-        return visible_modes(cms.reduce(component, modes=count, method="truncation"))
     return cms.reduce(component, modes=min(max(2 * modes, FEWEST_REFERENCE_MODES), size))
-
-
-def is_full(reference: cms.ReducedModel) -> bool:
-    """Whether a `reference_model` is the full model."""
-    return reference.method == "truncation"
-
-
-def receptance_bound(
-    component: cms.ComponentLike, whole: cms.ReducedModel, linear: Measured, setting: LoadCase
-) -> float:
-    """Bound of the error of a model's undamped receptance over the range, as in `Errors`."""
-    observed = setting.observe or whole.interfaces[0]
-    grid = np.linspace(*setting.range_hz, GRID)
-    band = cms.accuracy(component, whole).receptance_error(grid, observed, observed)
-    return float(np.linalg.norm(np.abs(band).max(axis=1)) / np.linalg.norm(linear.receptance))
 
 
 def with_orbit(
@@ -249,21 +231,6 @@ def with_orbit(
     except ConvergenceError as error:
         return replace(model, note=str(error))
     return replace(model, orbit=orbit, seconds_per_orbit=seconds_per_orbit(orbit, repeats=1))
-
-
-def visible_modes(reduced: cms.ReducedModel) -> cms.ReducedModel:
-    """The model without the modes that no interface sees."""
-    rows = np.array(list(reduced.participation.values()))
-    seen = np.any(np.abs(rows) > INVISIBLE * np.abs(rows).max(axis=1, keepdims=True), axis=0)
-    return replace(
-        reduced,
-        frequencies_hz=reduced.frequencies_hz[seen],
-        participation={name: row[seen] for name, row in reduced.participation.items()},
-        basis=reduced.basis[:, seen],
-        residuals=reduced.residuals[seen],
-        modes=int(np.count_nonzero(seen[: reduced.modes])),
-        damping=None if reduced.damping is None else reduced.damping[np.ix_(seen, seen)],
-    )
 
 
 def transferred(guess: Orbit, system: System) -> Orbit:

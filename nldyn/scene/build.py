@@ -214,13 +214,17 @@ def join(scene: Scene, parts: Mapping[str, AnyComponent] | None = None) -> cms.R
     for name, part in scene.component_scenes.items():
         with within_component(scene, name):
             models[name] = build_reduced(part, parts[name])
-    joints = [
+    _tell_of_crossed_joints(scene)
+    with told_as(scene, ("joints",), cms.ReductionError):
+        return cms.couple(models, joints_of(scene))
+
+
+def joints_of(scene: Scene) -> list[cms.Joint]:
+    """The joints of a scene."""
+    return [
         cms.Joint(place(joint.at), None if joint.against is None else place(joint.against))
         for joint in scene.joints
     ]
-    _tell_of_crossed_joints(scene)
-    with told_as(scene, ("joints",), cms.ReductionError):
-        return cms.couple(models, joints)
 
 
 def _tell_of_crossed_joints(scene: Scene) -> None:
@@ -395,7 +399,7 @@ def _relative_system(scene: Scene, reduced: cms.ReducedModel | None) -> System:
         check_ratio_count(scene, len(reduced.frequencies_hz), scene.file)
         projected = _projected_skew(scene, reduced)
         if scene.components:
-            _check_held(scene, reduced)
+            check_held(scene, reduced)
         return system_of_reduced(
             reduced,
             scene.observed,
@@ -406,7 +410,7 @@ def _relative_system(scene: Scene, reduced: cms.ReducedModel | None) -> System:
         )
 
 
-def _check_held(scene: Scene, reduced: cms.ReducedModel) -> None:
+def check_held(scene: Scene, reduced: cms.ReducedModel) -> None:
     """Refuse what nothing holds: rigid-body motions that no spring and no stop feels."""
     rigid = reduced.frequencies_hz == 0.0
     ends = [(stop.at, stop.against) for stop in scene.stops]

@@ -19,7 +19,11 @@ def load_case_of(scene: Scene) -> LoadCase:
         modes.
     """
     check_computable(scene, scene.file)
-    if scene.reduction is None:
+    if scene.components:
+        if all(part.reduction is None for part in scene.components.values()):
+            fault = "are not reduced: none has a [components.NAME.reduction]"
+            raise scene_error(scene.file, ("components",), fault)
+    elif scene.reduction is None:
         raise scene_error(scene.file, ("reduction",), "is missing: nothing is reduced")
     if scene.observe is not None and scene.observe.absolute:
         fault = "is not told where the modes are chosen or compared: leave it out there"

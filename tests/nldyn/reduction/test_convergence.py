@@ -27,7 +27,7 @@ from nldyn import (
 )
 from nldyn.app.cli import main
 from nldyn.base.resources import example
-from nldyn.reduction import convergence, model_errors
+from nldyn.reduction import convergence, model_errors, studied
 from nldyn.reduction.convergence import QUANTITIES
 from nldyn.reduction.model_errors import (
     contact_time,
@@ -39,8 +39,8 @@ from nldyn.reduction.model_errors import (
     matched,
     measured_linear,
     receptance,
-    receptance_bound,
 )
+from nldyn.reduction.studied import Alone, Reference, receptance_bound
 from nldyn.report.convergence import write_study
 from nldyn.report.convergence_page import panels
 from nldyn.report.offline import unpacked
@@ -71,7 +71,7 @@ def test_the_full_model_is_the_reference(study):
 
 
 def test_the_reference_of_a_large_component_has_a_bound_of_its_own_error(monkeypatch):
-    for module in (convergence, model_errors):
+    for module in (convergence, studied):
         monkeypatch.setattr(module, "ALL_MODES_UP_TO", 40)
     monkeypatch.setattr(model_errors, "FEWEST_REFERENCE_MODES", 6)
     study = convergence_study(string(), SETTING, modes=(1, 2))
@@ -84,7 +84,9 @@ def test_the_reference_of_a_large_component_has_a_bound_of_its_own_error(monkeyp
 def test_the_bound_of_the_reference_holds():
     setting, grid = replace(SETTING, modal_damping=0.0), np.linspace(*SETTING.range_hz, 400)
     reduced = cms.reduce(string(), modes=2)
-    bound = receptance_bound(string(), reduced, measured_linear("", "", reduced, setting), setting)
+    known = Reference(reduced, False, 0, {"": reduced})
+    linear = measured_linear("", "", reduced, setting)
+    bound = receptance_bound(Alone(string()), known, linear, setting)
     full = receptance(cms.reduce(string(), modes=MASSES), setting, grid)
     error = distance(receptance(reduced, setting, grid), full)
     assert 0.5 * bound < error < bound
@@ -257,7 +259,8 @@ def test_a_reference_without_a_bound_is_told_in_words(small):
     wide = replace(AT_TIP, range_hz=(30.0, 1000.0))
     whole = cms.reduce(cantilever(2), modes=1)
     linear = measured_linear("", "reference", whole, wide)
-    bound = receptance_bound(cantilever(2), whole, linear, wide)
+    known = Reference(whole, False, 0, {"": whole})
+    bound = receptance_bound(Alone(cantilever(2)), known, linear, wide)
     assert bound == np.inf
     models = (*small.models[:-1], replace(linear, orbit=small.reference.orbit))
     said = replace(small, models=models, reference_error=bound).report()
