@@ -2,3 +2,4 @@
 
 from nldyn.reduction.convergence import ConvergenceStudy as ConvergenceStudy
 from nldyn.reduction.selection import ModeSelection as ModeSelection
+from nldyn.reduction.studied import JoinedComponents as JoinedComponents
