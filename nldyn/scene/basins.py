@@ -110,8 +110,11 @@ def basins_of(
 
 
 def first_interface(system: System) -> str:
-    """The interface of the first stop, or the first one."""
-    return system.stops[0].at if system.stops else check_observe(system, None)
+    """The interface of the first stop, or the first one whose motion is relative."""
+    if system.stops:
+        return system.stops[0].at
+    relative = [name for name in system.interfaces if name not in system.rides]
+    return relative[0] if relative else check_observe(system, None)
 
 
 def _in_cells(tell: Progress) -> Callable[[int, int], None]:

@@ -95,6 +95,19 @@ def test_a_linear_structure_has_one_basin_in_a_plane_of_twice_its_steady_motion(
         assert (min(values), max(values)) == pytest.approx((-0.75 * edge, 0.75 * edge), rel=1e-4)
 
 
+def test_the_plane_of_what_is_observed_absolutely_is_relative(tmp_path):
+    shaken = LINEAR.replace('at = "x"\nkind = "harmonic"', 'at = "base"\nkind = "base"')
+    shaken = shaken.replace("interfaces.x", "loads.base = [1.0]\ninterfaces.x")
+    observed = 'quantity = "displacement"\n[observe]\nat = "x"\nabsolute = true\n'
+    result = told(tmp_path, shaken + observed, *HZ, "--cells", "2")
+    assert result.exit_code == 0, result.stderr
+    (row,) = rows(tmp_path / "out" / "attractors.csv")
+    rate = 0.2 * np.pi
+    exact = abs(1.0 + 0.2j * rate) / abs(1.0 - rate**2 + 0.2j * rate)  # transmissibility
+    assert float(row["max_displacement_m"]) == pytest.approx(exact, rel=1e-6)
+    assert "displacement of x (m)" in rows(tmp_path / "out" / "basins.csv")[0]
+
+
 def test_states_behind_a_rigid_stop_do_not_count(tmp_path):
     ranges = ("--x-range", "-1", "1", "--y-range", "-1", "1")
     result = told(tmp_path, LINEAR + WALL, *HZ, *ranges, "--cells", "8")

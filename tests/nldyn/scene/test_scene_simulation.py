@@ -59,6 +59,70 @@ def test_two_frequencies_beat_as_the_closed_form_says(tmp_path):
     assert (tmp_path / "out" / "simulation.png").stat().st_size > 1000
 
 
+def test_a_push_against_a_stop_has_the_impact_of_its_closed_form(tmp_path):
+    """From rest m x'' = F up to the gap g; then m x'' + k d = F from the speed v on."""
+    m, k, force, gap = 2.0, 50.0, 3.0, 0.1
+    text = f"""
+    [matrices]
+    mass = [[{m}]]
+    stiffness = [[0.0]]
+    interfaces.x = [1.0]
+    [[stops]]
+    at = "x"
+    law = "linear"
+    stiffness = {k}
+    gap = {gap}
+    [[excitation]]
+    at = "x"
+    kind = "constant"
+    force = {force}
+    """
+    result = told(tmp_path, text, "--frequency-hz", "0.4", "--periods", "1")
+    assert result.exit_code == 0, result.stderr
+    assert "Impacts: 1 from" in result.stdout
+    hit = {name: values[0] for name, values in columns(tmp_path / "out" / "impacts.csv").items()}
+    begin, v, w = math.sqrt(2 * m * gap / force), math.sqrt(2 * force * gap / m), math.sqrt(k / m)
+    duration = 2.0 / w * math.atan2(v / w, -force / k)
+    peak = force + k * math.hypot(force / k, v / w)
+    exact = {
+        "stop": 0.0, "time": begin, "phase_deg": 360.0 * 0.4 * begin, "duration": duration,
+        "speed": v, "rebound_speed": v, "penetration": peak / k, "peak_force": peak,
+        "impulse": 2.0 * m * v + force * duration, "work": 0.5 * peak**2 / k, "frequency_hz": 0.4,
+    }  # fmt: skip
+    assert hit.pop("loss") == pytest.approx(0.0, abs=1e-6)
+    assert hit == pytest.approx(exact, rel=1e-4)
+    motion = columns(tmp_path / "out" / "motion.csv")
+    assert motion["force_n[0]"].max() == pytest.approx(peak, rel=1e-2)
+
+
+def test_what_is_observed_is_simulated_from_rest_on_its_shaken_base(tmp_path):
+    """Absolute displacement of a mass on a base a cos νt: that of the base less that of rest."""
+    text = """
+    [matrices]
+    mass = [[1.0]]
+    stiffness = [[1.0]]
+    interfaces.x = [1.0]
+    loads.base = [1.0]
+    [[excitation]]
+    at = "base"
+    kind = "base"
+    quantity = "displacement"
+    amplitude = 0.2
+    [observe]
+    at = "x"
+    absolute = true
+    """
+    result = told(tmp_path, text, "--frequency-hz", "0.05", "--periods", "3")
+    assert result.exit_code == 0, result.stderr
+    found = columns(tmp_path / "out" / "motion.csv")
+    rate = 0.1 * math.pi
+    base = 0.2 * np.cos(rate * found["time_s"])
+    swing = np.cos(rate * found["time_s"]) - np.cos(found["time_s"])
+    relative = 0.2 * rate**2 / (1.0 - rate**2) * swing
+    assert found["displacement_m[x]"] == pytest.approx(relative, abs=1e-9)
+    assert found["displacement_m[x absolute]"] == pytest.approx(relative + base, abs=1e-9)
+
+
 def test_lyapunov_exponent_and_run_up(tmp_path):
     """Both exponents are -c/2; slowly run up, the peak in a period is that of the steady motion."""
     text = SCENE.partition('[[excitation]]\nat = "x"\nkind = "harmonic"\namplitude = 0.5')[0]
