@@ -118,7 +118,7 @@ def plain_warnings() -> Iterator[None]:
     help="Show the version and exit.",
 )
 def main() -> None:
-    """Bifurcation diagrams of structures that hit a stop, from a mesh or from modal data."""
+    """Bifurcation diagrams of structures that hit a stop, from meshes, matrices or modal data."""
 
 
 @main.command()
@@ -747,10 +747,11 @@ def render(
     quiet: bool,
     jobs: int,
 ) -> None:
-    """Draw mode shapes, deepest contact and one period in motion of a scene with a mesh.
+    """Draw mode shapes, deepest contact and one period in motion of a scene.
 
-    Writes modes.csv, pictures, an animation, and the pages mode_shapes.html and
-    deepest_contact.html for a browser. DIR may be that of a run.
+    All that is of a mesh is drawn; components from matrices have no shape. Writes modes.csv,
+    pictures, an animation, and the pages mode_shapes.html and deepest_contact.html for a browser.
+    DIR may be that of a run.
     """
     if period != 1 and frequency_hz is None:
         raise click.UsageError("'--period' needs '--frequency-hz'")

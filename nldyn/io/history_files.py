@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -89,11 +89,18 @@ def write_history(history: History, path: str | Path) -> None:
 
 def write_csv(history: History, path: Path) -> None:
     """The columns, with all their digits."""
-    columns = history.table()
+    write_pieces([history], path)
+
+
+def write_pieces(histories: Iterable[History], path: Path) -> None:
+    """Pieces of a history one after the other as a CSV file; see `Motion.histories`."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(np.column_stack([*columns.values()]).tolist())
+        for number, history in enumerate(histories):
+            columns = history.table()
+            if number == 0:
+                writer.writerow(columns)
+            writer.writerows(np.column_stack([*columns.values()]).tolist())
 
 
 def write_mat(history: History, path: Path) -> None:

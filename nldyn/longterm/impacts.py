@@ -23,6 +23,7 @@ from nldyn.system.system import System
 if TYPE_CHECKING:
     import pandas
 
+AT_ONCE = 4000  # panels
 FINE = 257  # points on a panel at which its polynomials are looked at
 
 UNITS = {
@@ -234,6 +235,16 @@ def panel_table(motion: Motion, stop: int) -> PanelTable:
 
 
 def _panel_table(
+    motion: Motion, pieces: _Pieces, stop: int, panels: NDArray[np.intp]
+) -> PanelTable:
+    """As `panel_table`, of some panels, so many at once that the points on them need no room."""
+    blocks = [panels[k : k + AT_ONCE] for k in range(0, max(len(panels), 1), AT_ONCE)]
+    tables = [_table_of_block(motion, pieces, stop, block) for block in blocks]
+    names = [field.name for field in fields(PanelTable)]
+    return PanelTable(*(np.concatenate([getattr(t, name) for t in tables]) for name in names))
+
+
+def _table_of_block(
     motion: Motion, pieces: _Pieces, stop: int, panels: NDArray[np.intp]
 ) -> PanelTable:
     flow, kind = motion.flow, pieces.kind[panels]

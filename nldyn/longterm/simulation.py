@@ -174,7 +174,19 @@ class Motion:
             If `samples` is not a whole number from 1 to 100 million.
         """
         check_whole("history: samples", samples, 1, MOST_PERIODS)
-        time = np.linspace(self.start_time, self.end_time, samples + 1)
+        return self._history_at(np.linspace(self.start_time, self.end_time, samples + 1))
+
+    def histories(self, samples: int, at_once: int) -> Iterator[History]:
+        """As `history`, in pieces of so many samples: of a long motion none holds all."""
+        check_whole("histories: samples", samples, 1)
+        check_whole("histories: at_once", at_once, 1)
+        step = (self.end_time - self.start_time) / samples
+        for first in range(0, samples + 1, at_once):
+            time = self.start_time + step * np.arange(first, min(first + at_once, samples + 1))
+            yield self._history_at(np.minimum(time, self.end_time))
+
+    def _history_at(self, time: Real) -> History:
+        """The motion at some instants."""
         states, where = self.states(time), self._stretch_at(time)
         rest = np.zeros((time.size, len(self.system.stops)))
         turns, pace = np.zeros(time.size), np.zeros(time.size)

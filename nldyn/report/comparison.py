@@ -163,6 +163,8 @@ def turned_alike(shapes: Real, others: Real, hz: Real) -> Real:
 def moved_nodes(scene: Scene, structure: Structure) -> tuple[Real, Real]:
     """Places (n, 3) of all nodes, and their translations (n, 3, k) in the modes."""
     component: Any = structure.component
+    if scene.components:
+        raise SceneError(f"{scene.file}: has several components, whose modes cannot be compared")
     if scene.mesh is None or structure.reduced is None or isinstance(component, cms.Matrices):
         raise SceneError(f"{scene.file}: has no mesh, so that its modes cannot be compared")
     points = np.asarray(component.model.mesh.points)

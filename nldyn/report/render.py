@@ -66,12 +66,12 @@ def render_scene(
     progress: Progress | None = None,
     jobs: int = 1,
 ) -> Rendering:
-    """Draw the mode shapes, the deepest contact and the motion of a scene with a mesh.
+    """Draw the mode shapes, the deepest contact and the motion of what is of a mesh in a scene.
 
     Parameters
     ----------
     scene : Scene
-        A scene with a ``[mesh]``. Without a ``[continuation]`` only its modes are drawn.
+        A scene with a ``[mesh]``, or a component with one. Without a ``[continuation]`` only its modes are drawn.
     directory : str or Path
         Gets ``modes.csv`` and ``mode_shapes.png``, and for the orbit ``orbit.png``,
         ``orbit.svg``, ``deepest_contact.png``, ``deepest_contact_stress.png`` and ``motion.gif``

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 from matplotlib.axes import Axes
 
-from nldyn.io.history_files import write_history
+from nldyn.base.arrays import Real
+from nldyn.io.history_files import write_pieces
 from nldyn.longterm.impacts import Impacts
 from nldyn.longterm.simulation import Motion
 from nldyn.orbits.history import History
@@ -17,6 +21,9 @@ from nldyn.report.results import write_table
 from nldyn.runtime.result_directory import result_directory
 
 PER_PERIOD = 64  # rows of the table in an excitation period
+DRAWN = 20_000  # points that a picture shows one by one
+BARS = 2000  # from lowest to highest, that it shows of more
+AT_ONCE = 8192  # rows that are held at once
 
 
 def write_simulation(
@@ -33,28 +40,53 @@ def write_simulation(
     """
     observed = check_observe(motion.system, None)
     hz, peaks = motion.period_peaks(observed)
-    history = motion.history(PER_PERIOD * max(hz.size, 1))
+    samples = PER_PERIOD * max(hz.size, 1)
+    curve = Curve(observed, math.ceil(samples / BARS) if samples > DRAWN else 1)
     with result_directory(directory, "simulation") as folder:
-        write_history(history, folder / "motion.csv")
+        pieces = motion.histories(samples, curve.each * max(AT_ONCE // curve.each, 1))
+        write_pieces(map(curve.seen, pieces), folder / "motion.csv")
         columns = hits.columns()
         rows = zip(*(column.tolist() for column in columns.values()), strict=True)
         write_table(folder / "impacts.csv", columns, rows)
         if motion.rate_hz_per_s:
             rows = zip(hz.tolist(), peaks.tolist(), strict=True)
             write_table(folder / "peaks.csv", ("frequency_hz", "max_abs_displacement_m"), rows)
-        ax = plot_sweep(motion) if motion.rate_hz_per_s else plot_motion(history, observed)
+        ax = plot_sweep(motion) if motion.rate_hz_per_s else plot_motion(curve)
         ax.set_title(title or "Simulation")
         save_figure(ax, folder / "simulation")
         (folder / "scene.toml").write_text(text, encoding="utf-8")
     return Path(directory)
 
 
-def plot_motion(history: History, interface: str) -> Axes:
+@dataclass
+class Curve:
+    """What is drawn of a motion: of every so many samples the lowest and the highest."""
+
+    interface: str
+    each: int
+    times: list[Real] = field(default_factory=list)
+    values: list[Real] = field(default_factory=list)
+
+    def seen(self, history: History) -> History:
+        """Take in a piece of the motion, and give it on."""
+        values = history.displacement[self.interface]
+        ends = np.arange(0, values.size, self.each)
+        low, high = np.minimum.reduceat(values, ends), np.maximum.reduceat(values, ends)
+        if self.each == 1:
+            self.times.append(history.time)
+            self.values.append(values)
+        else:
+            self.times.append(np.repeat(history.time[ends], 2))
+            self.values.append(np.column_stack([low, high]).ravel())
+        return history
+
+
+def plot_motion(curve: Curve) -> Axes:
     """Draw the displacement of an interface over the time."""
-    values = history.displacement[interface]
+    time, values = np.concatenate(curve.times), np.concatenate(curve.values)
     factor, unit = length_unit(float(abs(values).max()))
     ax = new_axes()
-    ax.plot(history.time, values / factor, color=PERIOD_COLOURS[0], linewidth=0.8)
+    ax.plot(time, values / factor, color=PERIOD_COLOURS[0], linewidth=0.8)
     ax.set_xlabel("time (s)")
-    ax.set_ylabel(f"displacement of {interface} ({unit})")
+    ax.set_ylabel(f"displacement of {curve.interface} ({unit})")
     return ax

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from nldyn import ConstantForce, System, simulate
 from nldyn.app.cli import main
+from nldyn.report.simulation import Curve
 
 SCENE = """
 [matrices]
@@ -121,6 +123,26 @@ def test_what_is_observed_is_simulated_from_rest_on_its_shaken_base(tmp_path):
     relative = 0.2 * rate**2 / (1.0 - rate**2) * swing
     assert found["displacement_m[x]"] == pytest.approx(relative, abs=1e-9)
     assert found["displacement_m[x absolute]"] == pytest.approx(relative + base, abs=1e-9)
+
+
+def test_pieces_of_a_long_motion_are_the_whole_and_a_picture_of_it_is_as_high():
+    """Of x = 1 - cos t, and of any number of samples, the picture shows the lowest and highest."""
+    system = System.from_matrices(
+        [[1.0]], [[1.0]], {"x": [1.0]}, excitation=[ConstantForce("x", 1.0)]
+    )
+    motion = simulate(system, 0.1, 5)
+    curve = Curve("x", each=7)
+    pieces = [curve.seen(piece) for piece in motion.histories(1000, 91)]
+    assert [piece.time.size for piece in pieces] == 11 * [91]
+    whole = motion.history(1000)
+    time = np.concatenate([piece.time for piece in pieces])
+    assert time == pytest.approx(whole.time, rel=1e-14)
+    joined = np.concatenate([piece.displacement["x"] for piece in pieces])
+    assert joined == pytest.approx(1.0 - np.cos(time), abs=1e-12)
+    drawn = np.concatenate(curve.values)
+    assert drawn.size == 2 * 143
+    assert (drawn.min(), drawn.max()) == (joined.min(), joined.max())
+    assert np.all(drawn[1::2] >= drawn[::2])
 
 
 def test_lyapunov_exponent_and_run_up(tmp_path):
