@@ -71,7 +71,8 @@ def render_scene(
     Parameters
     ----------
     scene : Scene
-        A scene with a ``[mesh]``, or a component with one. Without a ``[continuation]`` only its modes are drawn.
+        A scene with a ``[mesh]``, or a component with one. Without a ``[continuation]`` only its
+        modes are drawn.
     directory : str or Path
         Gets ``modes.csv`` and ``mode_shapes.png``, and for the orbit ``orbit.png``,
         ``orbit.svg``, ``deepest_contact.png``, ``deepest_contact_stress.png`` and ``motion.gif``
