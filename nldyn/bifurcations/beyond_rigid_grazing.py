@@ -28,6 +28,7 @@ from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import FROM_NEAR, ShootingProblem, asymmetry, metric_length
 
 SLIGHT = 1e-5, 1e-4, 1e-3  # first impacts and misses looked for, depth over the orbit's size
+SLIGHTER = 1e-6, 1e-7  # misses, where the motion at the touch hardly changes with the frequency
 FOLLOWED = 2e-6  # least impact with which a branch can begin: slower ones are not followed
 SLIGHT_BY_DIFFERENCES = 2e-3, 1e-2  # where they serve as derivatives by the parameter
 AS_ASKED = 0.1  # relative difference of the depth found from it
@@ -147,7 +148,8 @@ def first_beside(
     ConvergenceError, SystemModelError
         If none can be looked for.
     """
-    found = (_beside(exact, touches, beside, share) for share in shares)
+    slighter = () if any(beside.hits) else SLIGHTER
+    found = (_beside(exact, touches, beside, share) for share in (*shares, *slighter))
     return next((orbit for orbit in found if orbit is not None), None)
 
 

@@ -28,7 +28,8 @@ from nldyn.system.rigid_stop import RigidStop
 STEPS = 8  # most of Newton's method
 SMALL = 1e-12  # its last step, relative to the orbit
 DIFFERENCE = 1e-5  # of the parameter's coordinate
-RATE = 1e-4  # forcing phase in rad over which rates of the state are differences
+RATE = 1e-4  # forcing phase in rad over which rates of the state are differences, at most
+TURN_OF_FASTEST = 1e-3  # by which the fastest mode turns meanwhile: its square is their error
 AT_ONE_INSTANT = 1e-3  # rad between two touches of which the order is not followed
 
 
@@ -201,8 +202,10 @@ class Touches:
 
     def rate(self, state: Real, phase: float) -> Real:
         """Derivative (2n,) of the motion by the phase."""
-        near, far = (self.end(state, phase, phase + x) for x in (RATE, 2.0 * RATE))
-        return np.asarray((4.0 * near - 3.0 * state - far) / (2.0 * RATE))
+        fastest = float(self.problem.flow.system.natural_frequencies.max())
+        step = min(RATE, TURN_OF_FASTEST * self.omega / fastest)
+        near, far = (self.end(state, phase, phase + x) for x in (step, 2.0 * step))
+        return np.asarray((4.0 * near - 3.0 * state - far) / (2.0 * step))
 
     def moved(self, hits: Sequence[bool], amounts: Real, lead: int) -> tuple[Touches, Real]:
         """The same on a neighbouring orbit, and its amounts: speeds of hits and misses' clearances.
