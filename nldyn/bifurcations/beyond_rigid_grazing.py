@@ -70,7 +70,7 @@ def orbit_beyond(exact: Orbit, before: Orbit, family: OrbitFamily) -> Corrected 
         ahead = _ahead(touches, exact, before)
         if ahead is None or _slight_touches(exact) != len(touches.stops):
             return None
-        shares = SLIGHT if family.is_exact else SLIGHT_BY_DIFFERENCES
+        shares = (*SLIGHT, *SLIGHTER) if family.is_exact else SLIGHT_BY_DIFFERENCES
         return first_beside(exact, touches, ahead, shares)
     except (CoefficientError, ConvergenceError, SystemModelError, np.linalg.LinAlgError):
         return None
@@ -135,7 +135,7 @@ def _shares(exact: Orbit, touches: Touches, form: RootMap, kind: Beside) -> Sequ
         return SLIGHT
     growth = abs(form.growth(kind.hits.index(True))) / (touches.omega * length_unit(exact))
     share = min(0.1 * growth, SLIGHT[-1])
-    return [part for part in (share, 0.3 * share, 0.1 * share, *SLIGHT) if FOLLOWED < part <= share]
+    return [part for part in (share, 0.3 * share, 0.1 * share, *SLIGHT) if part <= share]
 
 
 def first_beside(
@@ -148,8 +148,8 @@ def first_beside(
     ConvergenceError, SystemModelError
         If none can be looked for.
     """
-    slighter = () if any(beside.hits) else SLIGHTER
-    found = (_beside(exact, touches, beside, share) for share in (*shares, *slighter))
+    followed = [share for share in shares if share > FOLLOWED or not any(beside.hits)]
+    found = (_beside(exact, touches, beside, share) for share in followed)
     return next((orbit for orbit in found if orbit is not None), None)
 
 
