@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -176,6 +176,16 @@ def _read_groups(data: Dataset) -> Iterator[tuple[str, list[tuple[int, int]]]]:
         yield name, list(zip(words[::4], words[1::4], strict=True))
 
 
+def _without_lost_points(
+    members: list[tuple[int, int]], elements: set[int]
+) -> list[tuple[int, int]]:
+    """A group without the elements of one node that Gmsh names but leaves out, beside its nodes."""
+    named = [n for kind, n in members if kind == ELEMENT]
+    nodes = [(kind, n) for kind, n in members if kind == NODE]
+    lost = len(named) == len(nodes) and elements.isdisjoint(named)
+    return nodes if lost and len(named) + len(nodes) == len(members) else members
+
+
 def _content(
     path: Path,
     points: dict[int, list[float]],
@@ -192,15 +202,18 @@ def _content(
         for kind, of_kind in cells.items()
     ]
     where = [{label: at for at, label in enumerate(of_kind)} for of_kind in cells.values()]
-    known = {NODE: place, ELEMENT: {label for at in where for label in at}}
+    elements_known = {label for at in where for label in at}
+    known: dict[int, Collection[int]] = {NODE: place, ELEMENT: elements_known}
     cell_sets: dict[str, list[IntArray]] = {}
     point_sets: dict[str, IntArray] = {}
-    for name, members in groups:
+    for name, listed in groups:
+        members = _without_lost_points(listed, elements_known)
         bad = next(((k, n) for k, n in members if n not in known.get(k, ())), None)
         if bad is not None:
             raise ModelError(
                 f"{path}: group {name!r} has member {bad[1]} of kind {bad[0]}, which is not defined"
-                f" ({NODE} are nodes and {ELEMENT} elements; others are not read)"
+                f" ({NODE} are nodes and {ELEMENT} elements; others are not read); Gmsh leaves out "
+                "elements of one node: let it save groups of nodes (Mesh.SaveGroupsOfNodes = 1)"
             )
         elements = [n for k, n in members if k == ELEMENT]
         nodes = [place[n] for k, n in members if k == NODE]

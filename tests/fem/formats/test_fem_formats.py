@@ -163,6 +163,23 @@ def test_a_universal_file_of_gmsh_has_the_nodes_of_each_cell_in_their_places(tmp
     assert (found.points[found.cells[kind]] == made.points[made.cells[kind]]).all()
 
 
+def test_points_that_gmsh_names_beside_elements_it_leaves_out_are_read(tmp_path):
+    with gmsh_at_work() as gmsh:
+        volume = gmsh.model.occ.addBox(0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [volume], name="block")
+        (corner,) = gmsh.model.getEntitiesInBoundingBox(0.9, 0.9, 0.9, 1.1, 1.1, 1.1, 0)
+        gmsh.model.addPhysicalGroup(0, [corner[1]], name="corner")
+        gmsh.model.mesh.generate(3)
+        gmsh.write(str(tmp_path / "without.unv"))
+        gmsh.option.setNumber("Mesh.SaveGroupsOfNodes", 1)
+        gmsh.write(str(tmp_path / "box.unv"))
+    found = fem.read_structure(tmp_path / "box.unv")
+    assert found.points[found.point_sets["corner"]].tolist() == [[1.0, 1.0, 1.0]]
+    with pytest.raises(fem.ModelError, match="'corner' has member 1 of kind 8, .* Gmsh"):
+        fem.read_structure(tmp_path / "without.unv")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
