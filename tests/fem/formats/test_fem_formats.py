@@ -176,7 +176,7 @@ def test_points_that_gmsh_names_beside_elements_it_leaves_out_are_read(tmp_path)
         gmsh.write(str(tmp_path / "box.unv"))
     found = fem.read_structure(tmp_path / "box.unv")
     assert found.points[found.point_sets["corner"]].tolist() == [[1.0, 1.0, 1.0]]
-    with pytest.raises(fem.ModelError, match="'corner' has member 1 of kind 8, .* Gmsh"):
+    with pytest.raises(fem.ModelError, match=r"'corner' has member 1 of kind 8, .* Gmsh"):
         fem.read_structure(tmp_path / "without.unv")
 
 
