@@ -42,7 +42,8 @@ def rest(system: System) -> Real:
     Raises
     ------
     SystemModelError
-        If a constant force acts on a body that neither a spring nor a stop holds against it.
+        If a constant force acts on a body that neither a spring nor a stop holds against it, or
+        only one out of all reach.
 
     Examples
     --------
@@ -59,7 +60,13 @@ def rest(system: System) -> Real:
     system = with_springs_for_rigid_stops(system)
     if system.bonds:
         return rest_positions(system)[0]
-    return _settled(system, np.zeros(system.size))
+    q = _settled(system, np.zeros(system.size))
+    if not np.all(np.isfinite(q)):
+        raise SystemModelError(
+            f"the structure rests farther away than {FARTHEST:g} m √kg: is a constant force or "
+            "the gap of the stop that holds it in the right unit?"
+        )
+    return q
 
 
 def rest_positions(system: System) -> list[Real]:

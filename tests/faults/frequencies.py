@@ -6,32 +6,32 @@ import scipy.linalg
 
 SMALL = 6  # as many coordinates are solved for in 80 digits
 ONE_FREQUENCY = 1e-9
-UNSEEN = 1e-8  # of a load along the mode: no more than rounding
 
 
-def lowest_hz(stiffness, mass, count, loads=None):
+def lowest_hz(stiffness, mass, count, loads=None, unseen=0.0, rigid=0):
     """Frequencies in Hz, and below which of them rounding of K cannot tell one from zero.
 
     Of many coordinates from the problem M u = K u / w², whose rounding spares the low ones, but
-    where K is singular. With loads (n, m) only modes that one of them moves, or at rest.
+    where K is singular. With loads (n, m) only the first ``rigid`` modes, and those that one of
+    them, scaled to one, moves by more than a share of their length.
     """
     heavy = np.diag(mass) > 0.0
     squares = np.diag(stiffness)[heavy] / np.diag(mass)[heavy]
     rounding = np.sqrt(64 * np.finfo(float).eps * squares.max(initial=0.0)) / (2 * np.pi)
     hz, modes = all_modes(stiffness, mass)
-    seen = np.ones(len(hz), dtype=bool) if loads is None else moved(hz, modes, loads, rounding)
+    seen = np.ones(len(hz), dtype=bool) if loads is None else moved(hz, modes, loads, unseen, rigid)
     return hz[seen][:count], rounding
 
 
-def moved(hz, modes, loads, rounding):
+def moved(hz, modes, loads, unseen, rigid):
     """Whether some load moves each mode; of modes of one frequency, as many as loads can tell."""
     forces = loads.T @ modes
     forces = forces / np.linalg.norm(loads, axis=0)[:, None] / np.linalg.norm(modes, axis=0)
-    seen = hz <= rounding
+    seen = np.arange(len(hz)) < rigid
     groups = np.cumsum(np.diff(hz, prepend=0.0) > ONE_FREQUENCY * hz)
     for group in np.unique(groups[~seen]):
         alike = np.flatnonzero((groups == group) & ~seen)
-        seen[alike[: np.linalg.matrix_rank(forces[:, alike], tol=UNSEEN)]] = True
+        seen[alike[: np.linalg.matrix_rank(forces[:, alike], tol=unseen)]] = True
     return seen
 
 

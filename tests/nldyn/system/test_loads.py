@@ -332,6 +332,15 @@ def test_the_instrument_touches_its_bumper_where_the_closed_form_says():
     assert exact == pytest.approx(4.646333, abs=5e-7)
 
 
+def test_a_stop_out_of_reach_gives_no_rest_position():
+    """0.1 N against 1 N/m beyond 10⁹ m: x = 10⁹ + 0.1 m is not computed, 10⁸ + 0.1 m is."""
+    free = System.from_modal([0.0], {"x": [1.0]}, excitation=[ConstantForce("x", 0.1)])
+    near, far = (free.with_elements(stops=[Stop.linear("x", 1.0, gap=gap)]) for gap in (1e8, 1e9))
+    assert rest(near) == pytest.approx([1e8 + 0.1], rel=1e-14)
+    with pytest.raises(SystemModelError, match="rests farther away than 1e\\+09 m √kg"):
+        rest(far)
+
+
 def test_a_tube_lies_in_its_baffle_with_the_force_of_beam_theory():
     """Three supports, the middle one a spring of 1e6 N/m that is 0.3 mm lower."""
     system = build_system(load_scene(example("tube_between_baffles.toml")))
