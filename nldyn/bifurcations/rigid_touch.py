@@ -27,7 +27,7 @@ from nldyn.system.rigid_stop import RigidStop
 
 STEPS = 8  # most of Newton's method
 SMALL = 1e-12  # its last step, relative to the orbit
-DIFFERENCE = 1e-5  # of the parameter's coordinate
+DIFFERENCE = 1e-7  # of the parameter's coordinate: short, as slow impacts may begin or end beside
 RATE = 1e-4  # forcing phase in rad over which rates of the state are differences, at most
 TURN_OF_FASTEST = 1e-3  # by which the fastest mode turns meanwhile: its square is their error
 AT_ONE_INSTANT = 1e-3  # rad between two touches of which the order is not followed

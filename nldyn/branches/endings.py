@@ -41,6 +41,10 @@ class Ending(Enum):
     CORNER = "a stop is grazed, where the curve has a corner that is not followed"
     OTHER_EXTREME = "another extreme gets as large as the one held, where that has a corner"
     GRAZES_RIGID = "grazes a rigid stop at {hz} Hz, where a multiplier tends to infinity"
+    TO_REST = (
+        "one more impact grazes at each of ever closer frequencies: near {hz} Hz they become a "
+        "series without end, behind which the motion comes to rest"
+    )
     MOST_POINTS = "{points} points"
     SHORT_STEP = "step below {step}: {obstacle}"
     OTHER = "{sentence}"  # of an earlier version

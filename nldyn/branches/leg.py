@@ -15,14 +15,15 @@ from nldyn.bifurcations.beyond_rigid_grazing import beyond_rigid_grazing, crosse
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossing, without_repeats
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
-from nldyn.bifurcations.touching import grazes_exactly, rigid_grazing
+from nldyn.bifurcations.touching import grazes_exactly, rigid_grazing, rigid_touches
 from nldyn.bifurcations.within_step import insert_dip, special_points_between
 from nldyn.branches.arclength import Stepper, StepperState
 from nldyn.branches.branch import WalkEnd
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.step_control import ContinuationOptions
+from nldyn.orbits.bordered import length_unit
 from nldyn.orbits.conditions import nearest_grazing
-from nldyn.orbits.orbit import same_orbit
+from nldyn.orbits.orbit import Orbit, same_orbit
 from nldyn.orbits.shooting import metric_length
 
 AT_FLIP = 1e-5  # distance of a turn of a doubled branch from its end that may be the flip itself
@@ -32,6 +33,9 @@ MOST_DETOUR = 500  # points of such a walk
 STRAIGHT = 1.1  # its length over that of the step, up to which it leads straight there
 TOGETHER = 1e-9  # arclength between two special points that rounding may exchange
 BEYOND = 0.25  # of the step: how far in ln ω one that searches the last may leave the range
+LONG_SERIES = 10  # impacts before a grazing, each slower than the last, that many would follow
+SHORT_SERIES = 3  # the same where the branch is followed no farther
+SLOWEST = 1.2e-3  # depth over size of the last of them: those behind are hardly told apart
 DETOUR_STEPS, DETOUR_GROWTH = 64.0, 8.0  # its first steps in the one it replaces, its longest
 
 
@@ -170,6 +174,9 @@ class LegBuilder:
             walk.stop_reason = walk.too_short()
             return False
         self.special_points.append(grazing)
+        if _nears_rest(grazing.orbit, last.orbit, LONG_SERIES):
+            walk.stop_reason = self._to_rest()
+            return False
         beyond = None
         if grazing.orbit is not last.orbit:
             beyond = beyond_rigid_grazing(grazing.point, last.orbit)
@@ -180,13 +187,18 @@ class LegBuilder:
                     "multipliers may cross the unit circle right beside the grazing"
                 )
         if beyond is None:
-            walk.stop_reason = Ending.GRAZES_RIGID.told(hz=f"{grazing.frequency_hz:.9g}")
+            ends = _nears_rest(grazing.orbit, last.orbit, SHORT_SERIES)
+            hz = f"{grazing.frequency_hz:.9g}"
+            walk.stop_reason = self._to_rest() if ends else Ending.GRAZES_RIGID.told(hz=hz)
             return False
         walk.begin_anew(beyond, beyond.arclength - grazing.point.arclength)
         self.nodes.append(beyond)
         self._piece = self._searched = len(self.nodes) - 1
         self._mark = self._here()
         return True
+
+    def _to_rest(self) -> StopReason:
+        return Ending.TO_REST.told(hz=f"{limit_of_grazings(self.special_points):.7g}")
 
     def _once_around(self) -> list[SpecialPoint]:
         """The special points of a closed branch, whose last step leads beyond the start.
@@ -339,6 +351,29 @@ def _grazing_at_end(nodes: Sequence[BranchNode]) -> SpecialPoint:
         way = last.orbit.frequency_hz - nodes[-2].orbit.frequency_hz
         error += abs(way * here[2] / (before[2] - here[2]))
     return SpecialPoint("GR", last, error)
+
+
+def _nears_rest(at: Orbit, before: Orbit, count: int) -> bool:
+    """Whether a slight impact begins behind some ever slower ones, of which more would follow."""
+    grazed, here = rigid_grazing(at), rigid_grazing(before)
+    if grazed is None or here is None or here[2] > 0.0:
+        return False
+    found = sorted(each[1:] for each in rigid_touches(at) if each[0] == grazed[0])
+    place = found.index(grazed[1:])
+    depths = [depth for _, depth in [*found, *found][: place + len(found)][-count:]]
+    slowest = SLOWEST * length_unit(at)
+    return 0.0 < depths[-1] < slowest and depths == sorted(depths, reverse=True)
+
+
+def limit_of_grazings(found: Sequence[SpecialPoint]) -> float:
+    """Frequency in Hz to which grazings tend at distances of a geometric series, or the last one.
+
+    So do those of impacts that come to rest (Budd and Dux 1994, *Phil. Trans. R. Soc. Lond. A* 347,
+    365-389).
+    """
+    *_, first, middle, last = [math.nan] * 3 + [s.frequency_hz for s in found if s.kind == "GR"]
+    ratio = (last - middle) / (middle - first)
+    return last + (last - middle) * ratio / (1.0 - ratio) if 0.0 < ratio < 1.0 else last
 
 
 def not_told_apart(found: Sequence[SpecialPoint]) -> list[str]:

@@ -323,8 +323,11 @@ class Grazing:
         return peak_past(at.problem, self.passages, at.nodes, at.omega)
 
     def reach(self, at: Evaluation) -> float:
-        """The depth of an extreme has a continuous derivative also where it is zero."""
-        return DIFFERENCE
+        """The depth of an extreme has a continuous derivative also where it is zero.
+
+        In a narrow passage between two others it is there for a short way only.
+        """
+        return DIFFERENCE * (self.half / WIDEST_PASSAGE if self.half else 1.0)
 
     def renewed(self, at: Evaluation) -> Grazing:
         """The same with the phase of another orbit."""

@@ -269,3 +269,22 @@ def test_an_impact_right_before_a_grazing_is_not_left_out_with_it():
     assert normal_form(touch).coefficient.value == pytest.approx(growth, rel=1e-6)
     assert [reason.ending for reason in branch.stop_reasons] == [Ending.RANGE_END] * 2
     assert {orbit.impacts for orbit in branch.points} == {1, 2}
+
+
+def test_grazings_that_accumulate_end_a_branch_where_impacts_come_to_rest():
+    """The frequency told parts orbits with very many impacts from those that rest."""
+    matrices, force = ([[1.0]], [[1.0]], [[0.1]]), [1.0]
+    system = system_of(matrices, force, [RigidStop("x0", RESTITUTION, GAP)])
+    branch = continue_branch(solve_orbit(system, 0.06299), (0.062, 0.063))
+    told = branch.stop_reasons[0]
+    assert told.ending is Ending.TO_REST
+    assert not branch.notes
+    grazings = [special for special in branch.special_points if special.kind == "GR"]
+    assert grazings[0].orbit.impacts > 25
+    gaps = np.diff([special.frequency_hz for special in grazings])
+    assert gaps[1:3] / gaps[:2] == pytest.approx(1.0 / RESTITUTION, rel=0.01)
+    limit = float(told.values["hz"])
+    behind, before = (solve_orbit(system, limit * (1.0 + off)) for off in (-1e-5, 1e-5))
+    assert behind.rests
+    assert not before.rests
+    assert before.impacts > 30
