@@ -19,12 +19,14 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import (
     ConvergenceError,
+    LocateError,
     SystemModelError,
     check_types,
     check_whole,
     is_finite,
 )
 from nldyn.base.optional import optional
+from nldyn.bifurcations.roots import root
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.orbits.newton import spread
 from nldyn.orbits.orbit import Orbit, check_observe
@@ -65,6 +67,8 @@ class Backbone:
         Linear mode at which the family begins, counted from 1.
     reason : str
         Why it ends.
+    rest_m : float
+        Displacement at rest of the observed interface.
 
     Examples
     --------
@@ -80,6 +84,7 @@ class Backbone:
     energy: Real
     mode: int
     reason: str
+    rest_m: float = 0.0
 
     def __repr__(self) -> str:
         """One line: mode, range of frequencies and amplitudes, and why it ends."""
@@ -97,8 +102,8 @@ class Backbone:
 
     @cached_property
     def amplitude(self) -> Real:
-        """Largest displacements in m at the observed interface, (k,)."""
-        return np.array([orbit.max_abs_displacement for orbit in self.orbits])
+        """Largest displacements from rest in m at the observed interface, (k,)."""
+        return np.array([farthest_from(self.rest_m, orbit) for orbit in self.orbits])
 
     @cached_property
     def stable(self) -> np.ndarray:
@@ -121,6 +126,11 @@ class Backbone:
                 "error": [orbit.error for orbit in self.orbits],
             }
         )
+
+
+def farthest_from(place_m: float, orbit: Orbit) -> float:
+    """Largest distance in m of the observed displacement from a place."""
+    return float(np.abs(orbit.observed_extremes.values - place_m).max(initial=0.0))
 
 
 def _stable(orbit: Orbit) -> bool:
@@ -146,8 +156,8 @@ def backbone(
     mode : int
         Mode of the small vibrations about the rest position, counted from 1.
     amplitude_m : (float, float)
-        Smallest and largest displacement in m at the observed interface: where the family begins
-        and ends.
+        Smallest and largest displacement from rest in m at the observed interface: where the family
+        begins and ends.
     observe : str, optional
         Interface; the first unless given.
     max_orbits : int
@@ -198,14 +208,15 @@ def backbone(
         if found is None:
             reason = f"step below {SHORTEST_STEP:g}: {family.obstacle}"
             break
+        if family.amplitude(found[0]) > high:
+            reason = "end of the range of amplitudes"
+            orbits.append(family.at_end(here, tangent, step, high) or found[0])
+            break
         here, tangent, turn = found
         step = min(LONGEST_STEP, step * min(1.5, 0.5 * LONGEST_TURN / max(turn, STRAIGHT)))
         orbits.append(here)
-        if here.max_abs_displacement > high:
-            reason = "end of the range of amplitudes"
-            break
     energy = np.array([family.energy(orbit) for orbit in orbits])
-    return Backbone(tuple(orbits), energy, mode, reason)
+    return Backbone(tuple(orbits), energy, mode, reason, family.rest_m)
 
 
 def _checked_range(amplitude_m: object) -> tuple[float, float]:
@@ -244,6 +255,7 @@ class _Family:
         self.problem: ShootingProblem = shooting_problem(flow, 1)
         self.rest = rest(flow.system)
         self.push = constant_force(flow.system)
+        self.rest_m = float(self.rest @ flow.system.participation[observe])
         self.origin = flow.to_state(at_rest(self.rest))
         self.obstacle = ""
 
@@ -299,6 +311,27 @@ class _Family:
             self.obstacle = "the family turns by more than a step can follow"
             return None
         return orbit, along, turn
+
+    def amplitude(self, orbit: Orbit) -> float:
+        """Largest displacement of an orbit from rest in m."""
+        return farthest_from(self.rest_m, orbit)
+
+    def at_end(self, here: Orbit, tangent: Real, step: float, amplitude: float) -> Orbit | None:
+        """Orbit of an amplitude, which is passed within a step; None if there is none."""
+        known: dict[float, Orbit] = {0.0: here}
+
+        def beyond(share: float) -> float:
+            if share:
+                found = self.next(here, tangent, share * step)
+                if found is None:
+                    raise LocateError(self.obstacle)
+                known[share] = found[0]
+            return self.amplitude(known[share]) / amplitude - 1.0
+
+        try:
+            return known[root(beyond)[0]]
+        except LocateError:
+            return None
 
     def solve(
         self, guess: Real, reference: Real, tangent: Real, step: float

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from nldyn.branches.backbone import Backbone
+from nldyn.branches.backbone import Backbone, farthest_from
 from nldyn.curves.curves import Curve
 from nldyn.plot.diagram import PERIOD_COLOURS, length_unit, new_axes, save_figure
 from nldyn.report.results import write_table
@@ -48,15 +48,16 @@ def write_backbone(
             table = forced.table()
             rows = zip(*(table[name].tolist() for name in table), strict=True)
             write_table(folder / "phase_resonance.csv", tuple(table), rows)
-            draw_forced(ax, forced, length_unit(float(found.amplitude.max()))[0])
+            draw_forced(ax, forced, found)
         save_figure(ax, folder / "backbone")
         (folder / "scene.toml").write_text(text, encoding="utf-8")
     return Path(directory)
 
 
-def draw_forced(ax: Axes, forced: Curve, unit_m: float) -> None:
-    """Add a curve of phase resonance to a backbone that is drawn in a unit of so many metres."""
-    sizes = np.array([orbit.max_abs_displacement for orbit in forced.orbits])
+def draw_forced(ax: Axes, forced: Curve, found: Backbone) -> None:
+    """Add a curve of phase resonance to the backbone that is drawn."""
+    unit_m = length_unit(float(found.amplitude.max()))[0]
+    sizes = np.array([farthest_from(found.rest_m, orbit) for orbit in forced.orbits])
     hz = [orbit.frequency_hz for orbit in forced.orbits]
     ax.plot(hz, sizes / unit_m, "--", color=PERIOD_COLOURS[1], label="forced, in phase resonance")
     ax.legend(fontsize="small")
@@ -73,7 +74,7 @@ def plot_backbone(found: Backbone, title: str = "") -> Axes:
         ax.plot(found.frequency_hz[unstable], sizes, "x", color="0.2", label="unstable")
         ax.legend(fontsize="small")
     ax.set_xlabel("frequency of the free motion (Hz)")
-    ax.set_ylabel(f"largest displacement at '{found.orbits[0].observe}' ({unit})")
+    ax.set_ylabel(f"largest displacement from rest at '{found.orbits[0].observe}' ({unit})")
     name = f"Backbone of mode {found.mode}"
     ax.set_title(f"{title}: {name.lower()}" if title else name)
     return ax

@@ -40,6 +40,21 @@ def test_duffings_backbone_is_an_elliptic_integral(cubic, largest):
     assert found.stable.all()
 
 
+def test_a_backbone_in_a_well_counts_from_its_bottom():
+    """u'' - u + u³ = 0, at 1 - A on the near side: x₁ dn, of period 2 √2 K(m) / x₁."""
+    wells = System.from_matrices(
+        [[1.0]], [[0.0]], {"x": [1.0]}, springs=[PolynomialSpring("x", [-1.0, 0.0, 1.0])]
+    )
+    found = backbone(wells, amplitude_m=(1e-2, 0.9))
+    assert abs(found.rest_m) == pytest.approx(1.0, rel=1e-12)
+    assert found.reason == "end of the range of amplitudes"
+    assert found.amplitude[[0, -1]] == pytest.approx([1e-2, 0.9], rel=1e-2)
+    assert found.amplitude[-1] == pytest.approx(0.9, rel=1e-8)
+    far = np.sqrt(2.0 - (1.0 - found.amplitude) ** 2)
+    exact = far / (2.0 * np.sqrt(2.0) * ellipk(2.0 - 2.0 / far**2))
+    assert found.frequency_hz == pytest.approx(exact, rel=1e-9)
+
+
 def test_a_bilinear_oscillator_has_one_frequency():
     found = backbone(oscillator(stops=[Stop.linear("x", 3.0)]), amplitude_m=(1e-4, 1.0))
     assert found.frequency_hz == pytest.approx(2.0 / (1.0 + 0.5) / (2.0 * np.pi), rel=1e-9)
