@@ -563,6 +563,7 @@ def _followed(
     backward: list[CurvePoint] = []
     first, last = curve.stop_reasons
     grazed: dict[bool, list[LocatedPoint]] = {False: [], True: []}  # at the end, the beginning
+    unmarked: list[str] = []
 
     def is_closed() -> bool:
         return has_ending((first, last), Ending.CLOSED_CURVE)
@@ -595,12 +596,15 @@ def _followed(
                 begin = None
                 if len(leg) > 1 and walk.stop_reason.ending is Ending.GRAZES_RIGID:
                     begin = beyond_grazing(leg[-1])
+            if len(leg) > 1 and walk.stop_reason.ending is Ending.GRAZES_RIGID:
+                grazed[leg is backward], missed = grazing_at_end(leg[-1])
+                unmarked += missed
+                if missed:
+                    walk.stop_reason = walk.too_short()
             if leg is forward:
                 last = walk.stop_reason
             else:
                 first = walk.stop_reason
-            if len(leg) > 1 and walk.stop_reason.ending is Ending.GRAZES_RIGID:
-                grazed[leg is backward] = grazing_at_end(leg[-1])
         if is_closed():
             first = last = Ending.CLOSED_CURVE.told()
         points = whole().points
@@ -612,8 +616,9 @@ def _followed(
             marks = [*grazed[True], *before[::-1], *curve.marks, *ahead, *grazed[False]]
             notes = [*curve.notes, *notes, *lost]
         done = replace(
-            curve, points=points, marks=tuple(marks), stop_reasons=(first, last), notes=tuple(notes)
-        )
+            curve, points=points, marks=tuple(marks), stop_reasons=(first, last),
+            notes=(*notes, *unmarked),
+        )  # fmt: skip
         keeper.work = lambda: done
     return done
 

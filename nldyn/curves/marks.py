@@ -24,7 +24,14 @@ from nldyn.branches.arclength import grazing_between
 from nldyn.curves.codimension_two import is_torus, torus_pair
 from nldyn.curves.point import CurvePoint, between, clear_of_nodes, curve_point
 from nldyn.curves.walk import UNFOLDED, is_torus_curve
-from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, length_unit
+from nldyn.orbits.bordered import (
+    Condition,
+    Free,
+    OrbitFamily,
+    correct,
+    length_unit,
+    nearest_depth,
+)
 from nldyn.orbits.conditions import (
     Both,
     BranchPointCondition,
@@ -216,17 +223,28 @@ def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], lis
     return [mark for _, mark in found], notes
 
 
-def grazing_at_end(end: CurvePoint) -> list[LocatedPoint]:
-    """The grazing of a rigid stop at which a curve of orbits in one parameter ends."""
+def grazing_at_end(end: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
+    """The grazing of a rigid stop at which a curve of orbits in one parameter ends, or a note."""
     if not isinstance(end.condition, Free):
-        return []
-    return [_rigid_grazing(end)]
+        return [], []
+    try:
+        return [_rigid_grazing(end)], []
+    except LocateError as error:
+        return [], [_missing("GR", end, error)]
 
 
 def _rigid_grazing(beside: CurvePoint) -> LocatedPoint:
-    """The grazing of a rigid stop beside a point of a curve in one parameter; else the point."""
+    """The grazing of a rigid stop beside a point of a curve in one parameter.
+
+    Raises
+    ------
+    LocateError
+        If it is not found.
+    """
     family = beside.found.at.family
-    found = grazing_beside(beside.orbit, family) or beside.found
+    found = grazing_beside(beside.orbit, family)
+    if found is None:
+        raise LocateError("the grazing of a rigid stop was not found")
     return LocatedPoint(
         "GR", found.orbit, (family.charts[0].parameter,), found.at.values,
         found.residual(found.condition), found.step,
@@ -251,8 +269,11 @@ def beyond_grazing(end: CurvePoint) -> CurvePoint | None:
 
 def _across_grazing(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
     """The grazing of a rigid stop between two points of orbits with and without its impact."""
-    grazing = _rigid_grazing(a)
-    notes = []
+    near = min(a, b, key=lambda point: nearest_depth(point.orbit))
+    try:
+        grazing, notes = _rigid_grazing(near), []
+    except LocateError as error:
+        return [], [_missing("GR", near, error)]
     slightest = (SLIGHT if a.found.at.family.is_exact else SLIGHT_BY_DIFFERENCES)[-1]
     if any(crosses_beside(grazing.orbit, side.orbit, slightest) for side in (a, b)):
         why = "multipliers may cross the unit circle right beside the grazing"

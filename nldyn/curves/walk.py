@@ -218,9 +218,12 @@ class CurveWalk:
             return Ending.CORNER.told()
         if isinstance(here.condition, Held) and here.condition.changes_extreme(here.orbit):
             return Ending.OTHER_EXTREME.told()
-        short = Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
         near = max(GRAZES, self._slightest)
-        return _grazes_rigid(here, -near, near) or short
+        return _grazes_rigid(here, -near, near) or self.too_short()
+
+    def too_short(self) -> StopReason:
+        """The reason to stop where no step leads on."""
+        return Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
 
     @property
     def _slightest(self) -> float:

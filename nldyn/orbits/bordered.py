@@ -309,8 +309,12 @@ class Evaluation:
 
     @cached_property
     def _end_difference(self) -> float:
-        """Over which ends are differenced; the speed of an impact goes with the root of a way."""
-        if not any(isinstance(stop, RigidStop) for stop in self.family.system.stops):
+        """Over which ends are differenced; the speed of an impact goes with the root of a way.
+
+        A motion past a grazing is smooth.
+        """
+        rigid = any(isinstance(stop, RigidStop) for stop in self.family.system.stops)
+        if not rigid or self.family.passages:
             return END_DIFFERENCE
         way = OF_SQUARE * nearest_depth(self.orbit) ** 2
         return min(max(way, LEAST_END_DIFFERENCE), END_DIFFERENCE)
@@ -548,6 +552,8 @@ def tangent_surface(at: Evaluation) -> tuple[Real, Real]:
     family = at.family
     n = family.n_states
     unit = 1.0 / np.sqrt(family.metric(at.point))
+    if not (np.isfinite(at.jacobian).all() and np.isfinite(at.residual).all()):
+        raise ConvergenceError("the motion has no finite derivatives")
     q, r = np.linalg.qr((at.jacobian * unit).T, mode="complete")
     if np.abs(np.diag(r)).min() < SINGULAR * np.abs(r).max():
         raise ConvergenceError("singular Jacobian")

@@ -35,6 +35,7 @@ from nldyn.system.system import System
 KINDS = ("LP", "PD", "NS", "BP", "GR")
 
 BESIDE = 3e-3  # of an orbit's size: a crossing within it belongs to a turn
+BESIDE_BY_DIFFERENCES = 0.1  # the same where no slighter impact is followed, see `CurveWalk`
 TOUCH = 1e-6  # of an orbit's size: depth of a touch beside its grazing point
 LEVEL, ALIKE = 1e-4, 1e-9  # relative difference of two extremes about to change places, or one
 SAME_EXTREME = 1e-2  # rad between an extreme and itself on a neighbouring orbit
@@ -676,7 +677,8 @@ def _solved(
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
         return None
     apart = metric_length(family.metric(guess), found.at.point - guess)
-    return found if found.converged and apart <= BESIDE else None
+    farthest = BESIDE if family.is_exact else BESIDE_BY_DIFFERENCES
+    return found if found.converged and apart <= farthest else None
 
 
 def defined_by(kind: str, family: OrbitFamily, orbit: Orbit) -> tuple[OrbitFamily, Condition]:

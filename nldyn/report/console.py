@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from nldyn.base.exit_codes import BAD_INPUT, INTERRUPTED
+from nldyn.base.exit_codes import BAD_INPUT, INTERRUPTED, NOTHING_FOUND
 from nldyn.runtime.interruption import interrupted
 
 
 @contextmanager
 def plain_errors() -> Iterator[None]:
     """Tell the user's errors in one line on stderr, without a traceback, and exit."""
-    from nldyn.base.errors import SceneError, SystemModelError
+    from nldyn.base.errors import ConvergenceError, SceneError, SystemModelError
     from nldyn.runtime.result_directory import OutputError
     from nldyn.scene.messages import printable
 
@@ -23,6 +23,9 @@ def plain_errors() -> Iterator[None]:
     except (SceneError, SystemModelError, OutputError) as error:
         print(f"nldyn: {printable(str(error))}", file=sys.stderr)
         sys.exit(BAD_INPUT)
+    except ConvergenceError as error:
+        print(f"nldyn: {printable(str(error))}", file=sys.stderr)
+        sys.exit(NOTHING_FOUND)
     except MemoryError:
         print("nldyn: the memory does not suffice for this", file=sys.stderr)
         sys.exit(BAD_INPUT)

@@ -154,7 +154,10 @@ def build_reduced(
             raise cms.ReductionError(f"the component floats ({modes})")
         if reduced.unseen_modes and not coupled:
             numbers = ", ".join(map(str, reduced.unseen_modes))
-            logger.info(f"kept modes that no interface can see: {numbers}; they change nothing")
+            alone = (
+                "" if getattr(component, "damping", None) is not None else "; they change nothing"
+            )
+            logger.info(f"kept modes that no interface can see: {numbers}{alone}")
         for sentence in told_of_seen(reduced, table.modes):
             logger.info(sentence)
         return reduced

@@ -175,6 +175,38 @@ def test_a_curve_in_any_parameter_goes_on_across_a_grazing(name):
         assert {point.orbit.impacts for point in curve.points} == {0, 1}
 
 
+@pytest.mark.parametrize(
+    ("hz", "natural_hz", "limits"), [(0.32, 1.0 / TURN, (0.13, 0.16)), (0.3, 0.07, (0.07, 0.08))]
+)
+def test_a_grazing_in_the_natural_frequency_is_that_of_the_linear_response(hz, natural_hz, limits):
+    """From the orbit with the impact, and from that without; impacts begin far from it."""
+
+    def room_left(natural_hz):
+        omega, natural = TURN * hz, TURN * natural_hz
+        return 1.0 / abs(natural**2 - omega**2 + 1j * DAMPING * natural * omega) - GAP
+
+    own = checked_parameter(oscillator(), "natural_frequency_hz")
+    curve = continue_orbit(solve_orbit(with_value(oscillator(), own, natural_hz), hz), own, limits)
+    (graze,) = [mark for mark in curve.marks if mark.kind == "GR"]
+    assert graze.values[0] == pytest.approx(brentq(room_left, *limits, xtol=1e-15), rel=1e-9)
+    assert {point.orbit.impacts for point in curve.points} == {0, 1}
+    assert not curve.notes
+
+
+def test_a_ball_that_ceases_to_fly_ends_a_curve_without_a_grazing():
+    """Without rebound it lies still on a table that shakes by less than g."""
+    g = 9.81
+    ball = System.from_matrices(
+        [[1.0]], [[0.0]], {"x": [1.0]}, stops=[RigidStop("x", 0.0, direction=-1)],
+        excitation=[HarmonicForce("x", 1.2 * g), ConstantForce("x", -g)],
+    )  # fmt: skip
+    curve = continue_orbit(solve_orbit(ball, 10.0), "amplitude", (0.9 * g, 1.21 * g))
+    assert curve.values.min() == pytest.approx(g, rel=1e-3)
+    assert not curve.marks
+    assert "may be missing" in curve.notes[0]
+    assert curve.stop_reasons[0].ending is Ending.SHORT_STEP
+
+
 def test_a_curve_goes_on_where_two_stops_are_grazed_at_once():
     """Between two equal stops, behind which the orbit has an impact at each."""
     system = oscillator()

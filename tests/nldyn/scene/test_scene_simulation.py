@@ -179,3 +179,10 @@ def test_what_makes_no_sense_is_told(tmp_path, more, fault):
     result = told(tmp_path, SCENE, "--frequency-hz", "1.0", *more)
     assert result.exit_code == 2 and fault in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_sweep_that_is_over_at_once_is_told(tmp_path):
+    way = ("--to-hz", "2.0", "--rate-hz-per-s", "1e12")
+    result = told(tmp_path, SCENE, "--frequency-hz", "1.0", *way)
+    assert result.exit_code == 1
+    assert result.stderr.splitlines()[-1].startswith("nldyn: the sweep from 1 Hz failed at once")
