@@ -239,7 +239,9 @@ def strike(fl, stop, speed, restitution, slope, phase, t, shift, with_columns, w
 def settle(fl, first, phase, t, shift, roundings, closed, struck, with_columns, w, columns):
     """Close the rigid stops on which the body rests now and open the others.
 
-    A gap and a rate of so many `roundings` are none.
+    A gap and a rate of so many `roundings` are none. A body that an impact on another stop has
+    lifted comes back, and stays where that is lost in the rounding of the gap: impacts on several
+    stops in turn end so, as those on one do.
 
     Resting is what is shut, does not part and is pushed on, together with all that does: stops
     that would have to pull are left out one by one.
@@ -250,6 +252,12 @@ def settle(fl, first, phase, t, shift, roundings, closed, struck, with_columns, 
             shut = s == first or closed[s] or struck[s]
             shut = shut or value - fl.stops[s, GAP] >= -roundings * output_noise(fl, s, w)
             closed[s] = shut and abs(speed) <= roundings * rate_noise(fl, s, w)
+    _, pushes = contact_forces(fl, w, phase, closed)
+    for s in range(closed.size):
+        if is_rigid(fl, s) and not closed[s]:
+            value, speed, _, _ = output_derivatives(fl, s, w, phase, 0.0)
+            shut = value - fl.stops[s, GAP] >= -roundings * output_noise(fl, s, w)
+            closed[s] = shut and speed < 0.0 and low(fl, s, w, -speed, pushes[s])
     for _ in range(closed.size):
         forces, _ = contact_forces(fl, w, phase, closed)
         weakest = -1

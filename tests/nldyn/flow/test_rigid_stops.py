@@ -305,6 +305,38 @@ def test_a_body_bounces_to_rest_beside_one_that_rests():
     assert np.abs(hits[0] - np.cumsum(2.0 * np.arctan(speeds / pull))).max() < 1e-9
 
 
+def test_a_bar_that_falls_on_its_ends_in_turn_comes_to_rest():
+    """Without rebound: while one end rests the other falls with 2g/3, and lifts it with v/3.
+
+    The ends have the inertia matrix of a bar with the square of its radius of inertia half that of
+    their distance: an impulse on one moves the other by a third. Each flight takes v/g, so that all
+    of them end 3v/2g after an impact of the speed v.
+    """
+    arm = math.sqrt(0.5)
+    ends = {"left": [1.0, -arm], "right": [1.0, arm]}
+    system = System.from_matrices(
+        np.eye(2), np.zeros((2, 2)), {**ends, "middle": [1.0, 0.0]},
+        stops=[RigidStop(end, 0.0, direction=-1) for end in ends],
+        excitation=[ConstantForce("middle", -G)],
+    )  # fmt: skip
+    height, fall = 0.1, 2.0 * G / 3.0
+    rows = np.array([system.participation[end] for end in ends])
+    start = np.append(np.linalg.solve(rows, [height, 0.0]), np.zeros(2))
+    motion = simulate(system, 1.0, 1, start=start)
+    hits = impacts(motion)
+    first, speed = math.sqrt(2.0 * height / fall), math.sqrt(2.0 * height * fall)
+    speeds = speed * 3.0 ** -np.arange(float(len(hits)))
+    assert 10 < len(hits) < 30
+    assert hits.stop.tolist() == [0, 1] * (len(hits) // 2) + [0] * (len(hits) % 2)
+    assert np.abs(hits.speed - speeds).max() < 1e-9
+    times = first + np.append(0.0, np.cumsum(speeds)[:-1]) / G
+    assert np.abs(hits.time - times).max() < 1e-9
+    left = 1.5 * speeds[-1] / G  # of flights lower than the rounding of the gap
+    assert left < 1e-6
+    assert hits.time[-1] + left == pytest.approx(first + 1.5 * speed / G, abs=1e-9)
+    assert np.abs(motion.end).max() < 1e-12
+
+
 def slower(speed):
     """Restitution that falls with the speed."""
     return 0.9 / (1.0 + 0.5 * speed), -0.45 / (1.0 + 0.5 * speed) ** 2
