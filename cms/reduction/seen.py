@@ -74,7 +74,8 @@ def turned(modes: Modes, groups: IntArray, loads: FloatArray) -> Modes:
     The first of them is the one that the loads (N, m), scaled to one, move most; so only as many
     are moved as there are independent loads. Rigid-body modes stay.
     """
-    forces = loads.T @ modes.vectors / np.linalg.norm(loads, axis=0)[:, None]
+    forces = loads.T @ modes.vectors
+    forces /= np.fmax(np.linalg.norm(loads, axis=0), np.finfo(float).tiny)[:, None]
     squares, vectors, errors = modes.squares.copy(), modes.vectors.copy(), modes.errors.copy()
     for group in np.flatnonzero(np.bincount(groups) > 1):
         same = np.flatnonzero(groups == group)

@@ -18,7 +18,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, LocateError, SystemModelError
 from nldyn.bifurcations.normal_form_coefficients import CoefficientError
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
-from nldyn.bifurcations.rigid_grazing import Beside, RootMap
+from nldyn.bifurcations.rigid_grazing import MOST_TOUCHES, Beside, RootMap
 from nldyn.bifurcations.rigid_touch import Touches
 from nldyn.bifurcations.sign_changes import accounted
 from nldyn.bifurcations.touching import rigid_touches
@@ -90,7 +90,7 @@ def switch_at_rigid_grazing(special: SpecialPoint, times: int = 1) -> list[Branc
     Returns
     -------
     list of BranchNode
-        One for each kind of impacts, heading away from the grazing.
+        One for each kind of impacts of which an orbit is found, heading away from the grazing.
 
     Raises
     ------
@@ -115,12 +115,14 @@ def switch_at_rigid_grazing(special: SpecialPoint, times: int = 1) -> list[Branc
         raise LocateError(f"no orbit is found beside the grazing at {hz}: {error}") from None
     period = times * exact.period
     if not found:
+        if len(touches.stops) > MOST_TOUCHES:
+            raise LocateError(f"too many touches graze at {hz} to tell which orbits begin there")
         raise LocateError(f"no orbit of period {period} with an impact begins at {hz}")
     nodes = [_as_node(exact, orbit) for orbit in found if orbit is not None]
     if not nodes:
         raise LocateError(
-            f"no orbit of period {period} is found beside the grazing at {hz}: its impacts are too "
-            "slow there"
+            f"no orbit of period {period} is found beside the grazing at {hz}, though one begins "
+            "there: its impacts may be too slow"
         )
     return nodes
 
@@ -219,6 +221,8 @@ def _depths(touches: Touches, orbit: Orbit) -> Real:
             for of, other, value in found
             if of == stop
         }
+        if not apart:
+            raise ConvergenceError("a touch has vanished")
         return apart[min(apart)]
 
     phases = touches.phases.tolist()

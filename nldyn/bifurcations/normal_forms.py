@@ -555,8 +555,8 @@ def _several_grazings(special: SpecialPoint, touches: Touches, form: RootMap) ->
     hit = {each.side for each in beside if any(each.hits)}
     return NormalForm(
         "multiple rigid grazing",
-        f"{touched}. The map of the motion beside it has a root for each touch. {begin}; with the "
-        f"speeds of impacts at touches a multiplier goes to infinity. {follows}.",
+        f"{touched}. The map of the motion beside it has a root for each touch. {begin}; as the "
+        f"speeds of impacts go to zero a multiplier goes to infinity. {follows}.",
         side=hit.pop() if len(hit) == 1 else 0,
         stable=orbit.stable,
     )

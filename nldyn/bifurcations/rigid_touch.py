@@ -203,7 +203,7 @@ class Touches:
     def rate(self, state: Real, phase: float) -> Real:
         """Derivative (2n,) of the motion by the phase."""
         fastest = float(self.problem.flow.system.natural_frequencies.max())
-        step = min(RATE, TURN_OF_FASTEST * self.omega / fastest)
+        step = min(RATE, TURN_OF_FASTEST * self.omega / max(fastest, self.omega))
         near, far = (self.end(state, phase, phase + x) for x in (step, 2.0 * step))
         return np.asarray((4.0 * near - 3.0 * state - far) / (2.0 * step))
 

@@ -372,7 +372,7 @@ def limit_of_grazings(found: Sequence[SpecialPoint]) -> float:
     365-389).
     """
     *_, first, middle, last = [math.nan] * 3 + [s.frequency_hz for s in found if s.kind == "GR"]
-    ratio = (last - middle) / (middle - first)
+    ratio = (last - middle) / (middle - first) if middle != first else math.nan
     return last + (last - middle) * ratio / (1.0 - ratio) if 0.0 < ratio < 1.0 else last
 
 

@@ -564,6 +564,7 @@ def _followed(
     first, last = curve.stop_reasons
     grazed: dict[bool, list[LocatedPoint]] = {False: [], True: []}  # at the end, the beginning
     unmarked: list[str] = []
+    chosen = options or ContinuationOptions()
 
     def is_closed() -> bool:
         return has_ending((first, last), Ending.CLOSED_CURVE)
@@ -587,16 +588,16 @@ def _followed(
                 end, origin = origin.reversed(), end.reversed()
             begin: CurvePoint | None = end
             while begin is not None:
-                walk = CurveWalk(begin, options or ContinuationOptions(), origin)
+                walk, known = CurveWalk(begin, chosen, origin), len(leg)
                 for point in walk:
                     leg.append(point)
                     if progress is not None:
                         progress(point.values)
                     keeper.offer()
-                begin = None
-                if len(leg) > 1 and walk.stop_reason.ending is Ending.GRAZES_RIGID:
+                begin, grazes = None, walk.stop_reason.ending is Ending.GRAZES_RIGID
+                if grazes and known + 1 < len(leg) < chosen.max_points:
                     begin = beyond_grazing(leg[-1])
-            if len(leg) > 1 and walk.stop_reason.ending is Ending.GRAZES_RIGID:
+            if len(leg) > 1 and grazes:
                 grazed[leg is backward], missed = grazing_at_end(leg[-1])
                 unmarked += missed
                 if missed:

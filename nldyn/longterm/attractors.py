@@ -176,12 +176,16 @@ class Attractor:
 
     @property
     def span(self) -> tuple[float, float]:
-        """Smallest and largest displacement of the first interface in m."""
-        motion = self.motion()
-        name = check_observe(motion.system, None)
+        """Smallest and largest displacement of the `interface` in m."""
+        motion, name = self.motion(), self.interface
         ends = motion.history(2).displacement[name]
         values = np.concatenate([motion.extremes(name)[1], ends])
         return float(values.min()), float(values.max())
+
+    @property
+    def interface(self) -> str:
+        """The first interface, of which the displacement is told."""
+        return check_observe(self.motion().system, None)
 
     @property
     def title(self) -> str:

@@ -348,10 +348,11 @@ class Basin:
 
     @property
     def text(self) -> str:
-        """Such as ``1: 40.0 ± 0.5 %, period 2, 1 impact, -0.001 to 0.002 m``."""
+        """Such as ``1: 40.0 ± 0.5 %, period 2, 1 impact, -0.001 to 0.002 m at 'a'``."""
         percent = f"{100.0 * self.share:.1f} ± {100.0 * self.uncertainty:.1f} %"
         low, high = self.attractor.span
-        return f"{self.number}: {percent}, {self.attractor.title}, {low:.3g} to {high:.3g} m"
+        span = f"{low:.3g} to {high:.3g} m at '{self.attractor.interface}'"
+        return f"{self.number}: {percent}, {self.attractor.title}, {span}"
 
 
 @dataclass(frozen=True, eq=False)

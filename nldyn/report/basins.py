@@ -13,7 +13,7 @@ from nldyn.report.results import if_known, write_table
 from nldyn.runtime.result_directory import result_directory
 
 COLUMNS = (
-    "attractor", "name", "share", "share_uncertainty", "period", "impacts_per_period",
+    "attractor", "name", "share", "share_uncertainty", "period", "impacts_per_period", "interface",
     "min_displacement_m", "max_displacement_m", "largest_exponent_per_s", "integrity", "distance",
     "evidence",
 )  # fmt: skip
@@ -44,12 +44,13 @@ def attractor_rows(found: Basins) -> Iterator[tuple[object, ...]]:
     for basin in found.basins:
         attractor = basin.attractor
         values = (
-            attractor.impact_rate, *attractor.span, float(attractor.largest_exponent[0]),
+            *attractor.span, float(attractor.largest_exponent[0]),
             basin.integrity, basin.distance,
         )  # fmt: skip
         yield (
             basin.number, attractor.name, basin.share, basin.uncertainty, attractor.period or None,
-            *map(if_known, values), attractor.evidence,
+            if_known(attractor.impact_rate), attractor.interface, *map(if_known, values),
+            attractor.evidence,
         )  # fmt: skip
 
 

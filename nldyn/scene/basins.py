@@ -80,7 +80,7 @@ def basins_of(
     ... amplitude = 1.0
     ... ''')
     >>> print(basins_of(scene, 10.0, cells=16).report())
-    1: 100.0 ± 0.5 %, period 1, no impacts, -0.000127 to 0.000127 m
+    1: 100.0 ± 0.5 %, period 1, no impacts, -0.000127 to 0.000127 m at 'tip'
     0 of 40 cells that were simulated once more came to another result
     """
     table = scene.continuation

@@ -109,6 +109,14 @@ def hz_of(squares):
     return np.sqrt(squares) / (2 * np.pi)
 
 
+def test_an_interface_that_pulls_nothing_inside_sees_no_mode_there():
+    """A held mass without a coupling to the others, of which two have one frequency."""
+    alone = cms.Matrices(np.diag([1.0, 2.0, 2.0]), np.eye(3), {"one": [1.0, 0.0, 0.0]})
+    reduced = cms.reduce(alone, modes=1, method="craig-bampton")
+    assert reduced.frequencies_hz == pytest.approx([1.0 / (2.0 * np.pi)])
+    assert reduced.modes == 0
+
+
 def test_fewer_modes_than_asked_for_are_told():
     said = []
     reduced = cms.reduce(springs(), modes=3, progress=said.append)
