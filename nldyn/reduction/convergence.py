@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -12,14 +12,18 @@ import cms
 from nldyn.base.errors import SystemModelError
 from nldyn.reduction.load_case import LoadCase
 from nldyn.reduction.model_errors import (
+    BRANCH_QUANTITIES,
     Errors,
     Measured,
     best_of,
     counted_modes,
+    covers,
     errors_of,
     largest_force,
     measured,
     measured_linear,
+    noted,
+    spans_in_words,
     with_orbit,
 )
 from nldyn.reduction.studied import (
@@ -149,7 +153,7 @@ class ConvergenceStudy:
             rows.append((
                 model.label, str(model.dofs), str(model.modes), str(model.size), *numbers,
                 *map(str, error.counts or ("-", "-")), force, contact,
-                f"{1e3 * model.seconds_per_orbit:.3g}", f"{model.seconds:.3g}",
+                if_finite(1e3 * model.seconds_per_orbit), if_finite(model.seconds),
             ))  # fmt: skip
         widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
         lines = [
@@ -167,11 +171,15 @@ class ConvergenceStudy:
                 lines += self.said_of(label, indices, counted_modes)
         for label, indices in self.mesh_series().items():
             lines += self.said_of(label, indices, lambda m: f"{m.dofs} degrees of freedom")
+        lines += [f"note: {note}" for note in self.notes()]
+        return "\n".join(lines + self.advice())
+
+    def notes(self) -> list[str]:
+        """What could not be computed or compared, a line for each note with the models' names."""
         notes: dict[str, list[str]] = {}
         for model in self.models:
             notes.setdefault(model.note, []).append(f"{model.label}, {counted_modes(model)}")
-        lines += [f"note: {'; '.join(names)}: {note}" for note, names in notes.items() if note]
-        return "\n".join(lines + self.advice())
+        return [f"{'; '.join(names)}: {note}" for note, names in notes.items() if note]
 
     def advice(self, tolerance: float = 0.01) -> list[str]:
         """How many modes suffice, one sentence for each mesh and method with several counts.
@@ -179,7 +187,8 @@ class ConvergenceStudy:
         A number of modes suffices if with it, and with every larger one of the study, the linear
         receptance and what is told of the harmonic branch, its contacts included, differ by less
         than the tolerance from the reference. Eigenfrequencies are left out: those of residual
-        modes are none of the structure.
+        modes are none of the structure. So are peaks, folds and flips if the reference's branch
+        does not cover the range.
 
         Parameters
         ----------
@@ -193,18 +202,29 @@ class ConvergenceStudy:
         ]
 
     def _advised(self, label: str, indices: Sequence[int], tolerance: float) -> str:
+        whole = covers(self.best.spans_hz, self.setting.range_hz)
+        unsaid = ("eigenfrequency", *(() if whole else BRANCH_QUANTITIES))
         told = [
             quantity
             for quantity in QUANTITIES
-            if quantity != "eigenfrequency"
+            if quantity not in unsaid
             and any(np.isfinite(getattr(self.errors[i], quantity)) for i in indices)
         ]
         found = {quantity: self.enough(quantity, tolerance, indices) for quantity in told}
         lacking = [QUANTITIES[quantity] for quantity, model in found.items() if model is None]
         share = f"{100 * tolerance:g} %"
+        partial = (
+            ""
+            if whole
+            else (
+                "; nothing on peaks, folds and flips, as the reference's branch covers "
+                f"{spans_in_words(self.best.spans_hz)} of {spans_in_words([self.setting.range_hz])}"
+            )
+        )
         if lacking:
             wrong = ", ".join(lacking)
-            return f"advice: {label}: no count of this study suffices for {share} in {wrong}"
+            said = f"advice: {label}: no count of this study suffices for {share} in {wrong}"
+            return said + partial
         modes = {quantity: model.modes for quantity, model in found.items() if model}
         last, most = max(modes.items(), key=lambda each: each[1])
         first = next(self.models[i] for i in indices if self.models[i].modes == most)
@@ -215,7 +235,9 @@ class ConvergenceStudy:
         if len(set(modes.values())) > 1:
             said += f", of which {QUANTITIES[last]} needs most"
         same = self.same_special_points(indices)
-        if same is None:
+        if not whole:
+            said += partial
+        elif same is None:
             said += "; no count has exactly the folds and flips of the reference"
         elif same.modes > most:
             said += f"; for the same folds and flips as the reference {counted_modes(same)}"
@@ -277,7 +299,7 @@ class ConvergenceStudy:
         self, label: str, indices: Sequence[int], size: Callable[[Measured], str]
     ) -> list[str]:
         """From what size on a series has exactly the reference's folds and flips."""
-        if all(self.models[index].special_hz is None for index in indices):
+        if all(self.errors[index].counts is None for index in indices):
             return []
         found = self.same_special_points(indices)
         if found is None:
@@ -357,7 +379,10 @@ def convergence_study(
     has the setting's modal damping for all of its modes, also the residual ones, whose damping is
     therefore not that of the full model.
     The harmonic branch is followed downwards from the orbit that a simulation from rest finds at
-    the upper end of the range.
+    the upper end of the range. If it does not come to the lower end, the branch from there is
+    followed too, and then the one at ``at_hz`` if both leave that out. Peaks, folds and flips are
+    those of all these pieces; they are compared only where the pieces cover the same frequencies
+    as those of the reference.
     """
     given = components if isinstance(components, Mapping) else {"": components}
     studied: dict[str, Studied] = {
@@ -394,10 +419,26 @@ def convergence_study(
     if full and best.orbit is not None:
         shares.weigh(FULL, 0.0)
         linear = with_orbit(linear, whole, setting, best.orbit, shares.part(FULL))
+    elif full:
+        linear = replace(linear, note=f"no orbit at {at_hz:g} Hz: the largest model has none")
+    place, case = models.index(best), (setting.range_hz, at_hz)
+    models = [noted(m, best, linear.orbit if full else best.orbit, case) for m in models]
+    best = models[place]
     models.append(linear)
     errors = tuple(errors_of(model, linear, best, full) for model in models)
     error = 0.0 if known.full else receptance_bound(finest, known, linear, setting)
     return ConvergenceStudy(setting, at_hz, tuple(models), errors, best, error, finest.counted)
+
+
+def if_finite(number: float) -> str:
+    """A number of the table, "-" if it is unknown.
+
+    Examples
+    --------
+    >>> if_finite(1.25), if_finite(float("nan"))
+    ('1.25', '-')
+    """
+    return f"{number:.3g}" if np.isfinite(number) else "-"
 
 
 def counts_up_to(most: int) -> list[int]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from cms.component.component import checked_pencil
 from nldyn.base.arrays import SLACK, Complex, Real
 from nldyn.base.errors import ConvergenceError
 from nldyn.branches.branch import Branch
-from nldyn.branches.continuation import continue_branch
+from nldyn.branches.continuation import continue_branch, open_ends
 from nldyn.branches.peaks import resonance_peaks
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.newton import refine
@@ -24,6 +24,7 @@ from nldyn.runtime.progress import Progress, silent
 from nldyn.system.springs_dampers import Damper, Spring
 from nldyn.system.system import System
 
+Case = tuple[tuple[float, float], float]  # range and frequency of a study in Hz
 GRID = 400
 LONGEST_SEARCH = 600.0  # s of processor time for the orbit with which a harmonic branch begins
 EIGENFREQUENCIES = 3
@@ -32,6 +33,7 @@ MATCH = 0.02  # special points of one kind farther apart are not the same
 FEWEST_REFERENCE_MODES = 40
 MASSLESS = "its interfaces have no mass, so that a stop has no equation of motion"
 MOVED = 1.001  # times an orbit: the start from which the time of Newton's method is measured
+BRANCH_QUANTITIES = ("peak_hz", "peak_m", "fold_flip")  # errors that need the whole range
 VISIBLE = 1e-6  # of the largest displacement at an interface: that of a mode which is seen there
 
 
@@ -61,6 +63,8 @@ class Measured:
         Time for the branch.
     note : str
         What could not be computed.
+    spans_hz : tuple of (float, float)
+        Frequencies that the pieces of the harmonic branch cover, ascending and apart.
     """
 
     mesh: str
@@ -76,6 +80,7 @@ class Measured:
     seconds_per_orbit: float
     seconds: float
     note: str = ""
+    spans_hz: tuple[tuple[float, float], ...] = ()
 
     @property
     def label(self) -> str:
@@ -91,6 +96,8 @@ class Measured:
 class Errors:
     """Relative errors of one model against the reference; nan where a number is missing.
 
+    Peaks, folds and flips are compared only if both branches cover the same frequencies.
+
     Parameters
     ----------
     eigenfrequency : float
@@ -104,7 +111,7 @@ class Errors:
         are none.
     counts : (int, int) or None
         Folds and flips of the reference that the model lacks, and the other way round; None if
-        it has no branch.
+        it has no branch, or one that covers other frequencies.
     force, contact : float
         Largest contact force and whole contact time per period of the orbit at the frequency of
         the study.
@@ -155,20 +162,21 @@ def measured(
     try:
         what = f"{linear.label}, {counted_modes(linear)}"
         tell = told(progress, what, setting.range_hz)
-        branch = harmonic_branch(setting.system(reduced), setting, tell)
+        pieces, notes = harmonic_pieces(setting.system(reduced), setting, at_hz, tell)
     except ConvergenceError as error:
         return replace(linear, note=str(error))
     seconds = time.perf_counter() - start
-    peaks = resonance_peaks(branch)
-    orbits = branch.at(at_hz)
+    peaks = [peak for piece in pieces for peak in resonance_peaks(piece)]
+    orbits = [orbit for piece in pieces for orbit in piece.at(at_hz)]
     return replace(
         linear,
         peak=max(peaks, key=lambda p: p.height).orbit if peaks else None,
-        special_hz=special_points_of(branch),
+        special_hz=special_points_of(pieces),
         orbit=orbits[0] if orbits else None,
         seconds_per_orbit=seconds_per_orbit(orbits[0]) if orbits else np.nan,
         seconds=seconds,
-        note="; ".join(branch.notes),
+        note="; ".join(dict.fromkeys([note for piece in pieces for note in piece.notes] + notes)),
+        spans_hz=merged(piece.span_hz for piece in pieces),
     )
 
 
@@ -327,6 +335,118 @@ def harmonic_branch(system: System, setting: LoadCase, tell: Callable[[float], N
     return continue_branch(orbit, (low, high), progress=tell)
 
 
+def harmonic_pieces(
+    system: System, setting: LoadCase, at_hz: float, tell: Callable[[float], None]
+) -> tuple[list[Branch], list[str]]:
+    """The harmonic branch from the upper end of the range, and what it leaves out.
+
+    If it does not come to the lower end, also the branch from there; if both leave out the
+    frequency of the study, also the one through the orbit there. With notes on starts without an
+    orbit.
+    """
+    pieces, notes = [harmonic_branch(system, setting, tell)], []
+    low, _ = setting.range_hz
+    for hz in (low * (1.0 + SLACK), at_hz):
+        spans = merged(piece.span_hz for piece in pieces)
+        if covers(spans, (hz, hz)):
+            continue
+        try:
+            orbit = solve_orbit(
+                FlowMap(system), hz, observe=setting.observe, seconds=LONGEST_SEARCH
+            )
+        except ConvergenceError as error:
+            notes.append(f"a branch through {hz:g} Hz is missing: {error}")
+            continue
+        pieces.append(
+            continue_branch(
+                orbit,
+                setting.range_hz,
+                progress=lambda _, reached=spans[-1][0]: tell(reached),
+                open_ends=[end for piece in pieces for end in open_ends(piece)],
+            )
+        )
+    return pieces, notes
+
+
+def merged(spans_hz: Iterable[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    """Spans that overlap made one, ascending.
+
+    Examples
+    --------
+    >>> merged([(5.0, 8.0), (1.0, 2.0), (7.0, 9.0)])
+    ((1.0, 2.0), (5.0, 9.0))
+    """
+    found: list[tuple[float, float]] = []
+    for low, high in sorted(spans_hz):
+        if found and low <= found[-1][1] * (1.0 + SLACK):
+            low, high = found[-1][0], max(found.pop()[1], high)
+        found.append((low, high))
+    return tuple(found)
+
+
+def covers(
+    spans_hz: Sequence[tuple[float, float]], wanted: tuple[float, float], slack: float = SLACK
+) -> bool:
+    """Whether one of some spans holds another span, up to a relative difference.
+
+    Examples
+    --------
+    >>> covers([(1.0, 2.0), (5.0, 9.0)], (5.0, 8.0)), covers([(1.0, 2.0), (5.0, 9.0)], (2.0, 5.0))
+    (True, False)
+    """
+    return any(
+        low <= wanted[0] * (1.0 + slack) and wanted[1] * (1.0 - slack) <= high
+        for low, high in spans_hz
+    )
+
+
+def alike_spans(a: Measured, b: Measured) -> bool:
+    """Whether the branches of two models cover the same frequencies, up to 2 %."""
+    pairs = [(a, span) for span in b.spans_hz] + [(b, span) for span in a.spans_hz]
+    return all(covers(model.spans_hz, span, MATCH) for model, span in pairs)
+
+
+def spans_in_words(spans_hz: Sequence[tuple[float, float]]) -> str:
+    """Spans as a list.
+
+    Examples
+    --------
+    >>> spans_in_words([(4.0, 4.04441), (11.7417, 12.0)])
+    '4 to 4.0444 and 11.742 to 12 Hz'
+    """
+    return " and ".join(f"{low:.5g} to {high:.5g}" for low, high in spans_hz) + " Hz"
+
+
+def noted(model: Measured, best: Measured, exact: Orbit | None, case: Case) -> Measured:
+    """A model with notes on what of its branch and its contacts is not compared, and why.
+
+    Parameters
+    ----------
+    model, best : Measured
+        The model, and that whose branch is the reference's.
+    exact : Orbit or None
+        The orbit of reference.
+    case : ((float, float), float)
+        Range and frequency of the study in Hz.
+    """
+    if model.special_hz is None:
+        return model
+    range_hz, at_hz = case
+    notes = [model.note] if model.note else []
+    alike = alike_spans(model, best)
+    if not (alike and covers(model.spans_hz, range_hz)):
+        said = f"the branch covers {spans_in_words(model.spans_hz)} of {spans_in_words([range_hz])}"
+        if not alike:
+            said += f", that of the reference {spans_in_words(best.spans_hz)}"
+            said += ": peaks, folds and flips are not compared"
+        notes.append(said)
+    if model.orbit is None:
+        notes.append(f"no orbit of the branch at {at_hz:g} Hz, so that its contacts are unknown")
+    elif exact is None:
+        notes.append(f"the reference has no orbit at {at_hz:g} Hz: contacts are not compared")
+    return replace(model, note="; ".join(notes))
+
+
 def told(progress: Progress, what: str, range_hz: tuple[float, float]) -> Callable[[float], None]:
     """Tell how much of a range a branch covers that comes down from its upper end."""
     low, high = range_hz
@@ -368,7 +488,9 @@ def errors_of(model: Measured, reference: Measured, best: Measured, full: bool) 
     """
     eigenfrequency = frequency_error(model.frequencies_hz, reference.frequencies_hz)
     fold_flip, counts = np.nan, None
-    if model.special_hz is not None and best.special_hz is not None:
+    alike = alike_spans(model, best)
+    peak = model.peak if alike else None
+    if alike and model.special_hz is not None and best.special_hz is not None:
         fold_flip, *lacking = matched(model.special_hz, best.special_hz)
         counts = (lacking[0], lacking[1])
         if lacking[0] == sum(map(len, best.special_hz.values())):
@@ -377,8 +499,8 @@ def errors_of(model: Measured, reference: Measured, best: Measured, full: bool) 
     return Errors(
         eigenfrequency,
         distance(model.receptance, reference.receptance),
-        relative(model.peak, best.peak, lambda o: o.frequency_hz),
-        relative(model.peak, best.peak, lambda o: o.max_abs_displacement),
+        relative(peak, best.peak, lambda o: o.frequency_hz),
+        relative(peak, best.peak, lambda o: o.max_abs_displacement),
         fold_flip,
         counts,
         relative(model.orbit, orbit, largest_force),
@@ -410,10 +532,11 @@ def relative(a: Orbit | None, b: Orbit | None, number: Callable[[Orbit], float])
     return abs(number(a) - exact) / abs(exact) if a is not None and exact else np.nan
 
 
-def special_points_of(branch: Branch) -> dict[str, tuple[float, ...]]:
-    """Frequencies of the folds and flips of a branch, by kind."""
+def special_points_of(pieces: Sequence[Branch]) -> dict[str, tuple[float, ...]]:
+    """Frequencies of the folds and flips of the pieces of a branch, by kind."""
+    points = [point for piece in pieces for point in piece.special_points]
     return {
-        kind: tuple(sorted(p.frequency_hz for p in branch.special_points if str(p.kind) == kind))
+        kind: tuple(sorted(p.frequency_hz for p in points if str(p.kind) == kind))
         for kind in SPECIAL_KINDS
     }
 

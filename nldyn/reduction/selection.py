@@ -300,7 +300,7 @@ class Judge:
         if model is self.reference:
             return 0.0, 0, 0
         branch = harmonic_branch(self.setting.system(model), self.setting, tell)
-        return matched(special_points_of(branch), special_points_of(self.branch))
+        return matched(special_points_of([branch]), special_points_of([self.branch]))
 
 
 def moved(

@@ -57,7 +57,7 @@ def study_content(
         "subtitle": f"harmonic branch from {low:g} to {high:g} Hz; contacts at {study.at_hz:g} Hz",
         "advice": [line.removeprefix("advice: ") for line in study.advice(TOLERANCE)],
         "reference": study.said_of_references().splitlines(),
-        "notes": list(dict.fromkeys(model.note for model in study.models if model.note)),
+        "notes": study.notes(),
         "tolerance": TOLERANCE,
         "bound": known(study.reference_error) or 0.0,
         "views": views(study),

@@ -16,6 +16,7 @@ import fem
 from nldyn import (
     ConvergenceError,
     Damper,
+    HarmonicForce,
     LoadCase,
     SceneError,
     Stop,
@@ -38,6 +39,7 @@ from nldyn.reduction.model_errors import (
     massless_receptance,
     matched,
     measured_linear,
+    noted,
     receptance,
 )
 from nldyn.reduction.studied import Alone, Reference, receptance_bound
@@ -332,6 +334,71 @@ def test_refined_meshes_converge_to_the_frequencies_of_the_beam():
     hz = [cms.reduce(c, modes=3).frequencies_hz[:3] for c in components]
     assert components[1].stiffness.shape[0] > 1.9 * components[0].stiffness.shape[0]
     np.testing.assert_allclose(hz[1], hz[0], rtol=1e-6)
+
+
+PAIR = np.array([[650.0, -20.0], [-20.0, 3220.0]])  # stiffness of two masses of 1 kg
+UP_TO_A_FOLD = LoadCase(
+    (3.0, 10.2),
+    stops=tuple(Stop("high", 3000.0, 1.0, gap=0.02, direction=way) for way in (1, -1)),
+    excitation=(HarmonicForce("high", 10.0),),
+    modal_damping=0.02,
+    observe="low",
+)
+
+
+@pytest.fixture(scope="module")
+def folded():
+    """At 10.2 Hz the motion from rest touches no stop; its branch folds, and goes back there."""
+    interfaces = {"low": np.eye(2)[0], "high": np.eye(2)[1]}
+    pair = cms.Matrices(PAIR, np.eye(2), interfaces)
+    return convergence_study(pair, UP_TO_A_FOLD, modes=(1, 2), at_hz=6.0)
+
+
+def test_a_branch_that_folds_back_is_followed_from_the_other_end_too(folded):
+    """The highest peak is that of the linear response near 4 Hz, which reaches no stop."""
+    (fold,) = folded.best.special_hz["LP"]
+    assert fold > 9.0
+    squares, shapes = np.linalg.eigh(PAIR)
+    omega = 2 * np.pi * np.linspace(4.05, 4.06, 10001)[:, None]
+    damping = 2j * 0.02 * omega * np.sqrt(squares)
+    response = 10.0 * np.abs(np.sum(shapes[0] * shapes[1] / (squares - omega**2 + damping), axis=1))
+    peak = folded.best.peak
+    assert peak.max_abs_displacement == pytest.approx(response.max(), rel=1e-7)
+    assert peak.frequency_hz == pytest.approx(omega[response.argmax(), 0] / (2 * np.pi), rel=1e-5)
+    assert folded.best.orbit.frequency_hz == pytest.approx(6.0)
+    assert not folded.notes()
+
+
+def with_spans(study, spans):
+    """A study as if its models had such branches, without an orbit for contacts."""
+    cut = [
+        replace(model, spans_hz=(span,), orbit=None)
+        for model, span in zip(study.models[:-1], spans, strict=True)
+    ]
+    full, case = study.reference, (study.setting.range_hz, study.at_hz)
+    models = tuple(noted(model, cut[-1], None, case) for model in cut)
+    errors = [errors_of(model, full, models[-1], False) for model in (*models, full)]
+    return replace(study, models=(*models, full), errors=tuple(errors), best=models[-1])
+
+
+def test_pieces_of_other_frequencies_are_not_compared_and_the_note_says_why(folded):
+    cut = with_spans(folded, [(9.68, 10.2), (3.0, 10.2)])
+    error = cut.errors[0]
+    assert np.isnan((error.peak_hz, error.peak_m, error.fold_flip)).all() and error.counts is None
+    assert cut.errors[1].counts == (0, 0)
+    assert cut.models[0].note == (
+        "the branch covers 9.68 to 10.2 Hz of 3 to 10.2 Hz, that of the reference 3 to 10.2 Hz: "
+        "peaks, folds and flips are not compared; "
+        "no orbit of the branch at 6 Hz, so that its contacts are unknown"
+    )
+    assert cut.models[1].note.startswith("no orbit of the branch at 6 Hz")
+    assert "note: rubin, 1 mode: the branch covers 9.68" in cut.report()
+
+
+def test_nothing_is_advised_on_peaks_if_the_branch_of_reference_is_a_piece(folded):
+    (said,) = with_spans(folded, [(9.69, 10.2), (9.68, 10.2)]).advice()
+    assert said.startswith("advice: rubin: 1 mode suffices for 1 % in receptance; nothing on peaks")
+    assert said.endswith("the reference's branch covers 9.68 to 10.2 Hz of 3 to 10.2 Hz")
 
 
 SPACE_FRAME = """
