@@ -213,18 +213,15 @@ class ConvergenceStudy:
         found = {quantity: self.enough(quantity, tolerance, indices) for quantity in told}
         lacking = [QUANTITIES[quantity] for quantity, model in found.items() if model is None]
         share = f"{100 * tolerance:g} %"
-        partial = (
-            ""
-            if whole
-            else (
-                "; nothing on peaks, folds and flips, as the reference's branch covers "
-                f"{spans_in_words(self.best.spans_hz)} of {spans_in_words([self.setting.range_hz])}"
-            )
-        )
+        unasked = ""
+        if not whole:
+            covered, asked = map(spans_in_words, (self.best.spans_hz, [self.setting.range_hz]))
+            unasked = "; nothing on peaks, folds and flips, as the reference's branch covers "
+            unasked += f"{covered} of {asked}"
         if lacking:
             wrong = ", ".join(lacking)
             said = f"advice: {label}: no count of this study suffices for {share} in {wrong}"
-            return said + partial
+            return said + unasked
         modes = {quantity: model.modes for quantity, model in found.items() if model}
         last, most = max(modes.items(), key=lambda each: each[1])
         first = next(self.models[i] for i in indices if self.models[i].modes == most)
@@ -236,7 +233,7 @@ class ConvergenceStudy:
             said += f", of which {QUANTITIES[last]} needs most"
         same = self.same_special_points(indices)
         if not whole:
-            said += partial
+            said += unasked
         elif same is None:
             said += "; no count has exactly the folds and flips of the reference"
         elif same.modes > most:

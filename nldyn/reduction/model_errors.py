@@ -346,9 +346,13 @@ def harmonic_pieces(
     """
     pieces, notes = [harmonic_branch(system, setting, tell)], []
     low, _ = setting.range_hz
+    reached, _ = pieces[0].span_hz
+
+    def still(_: float) -> None:
+        tell(reached)
+
     for hz in (low * (1.0 + SLACK), at_hz):
-        spans = merged(piece.span_hz for piece in pieces)
-        if covers(spans, (hz, hz)):
+        if covers([piece.span_hz for piece in pieces], (hz, hz)):
             continue
         try:
             orbit = solve_orbit(
@@ -361,7 +365,7 @@ def harmonic_pieces(
             continue_branch(
                 orbit,
                 setting.range_hz,
-                progress=lambda _, reached=spans[-1][0]: tell(reached),
+                progress=still,
                 open_ends=[end for piece in pieces for end in open_ends(piece)],
             )
         )
