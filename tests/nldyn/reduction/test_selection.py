@@ -90,7 +90,7 @@ def test_true_error_of_folds_and_flips_lies_within_the_stated_band(stiffness, ra
     found = select_modes(string(), setting, tolerance=0.02, special_points=True)
     models = (cms.reduce(string(), modes=MASSES), found.reduced)
     exact, own = (
-        special_points_of(harmonic_branch(setting.system(m), setting, lambda hz: None))
+        special_points_of([harmonic_branch(setting.system(m), setting, lambda hz: None)])
         for m in models
     )
     assert len(exact["PD"]) >= 2
