@@ -18,22 +18,23 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, LocateError, SystemModelError
 from nldyn.bifurcations.normal_form_coefficients import CoefficientError
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
-from nldyn.bifurcations.rigid_grazing import MOST_TOUCHES, Beside, RootMap
+from nldyn.bifurcations.rigid_grazing import MOST_TOUCHES, Beside, RootMap, turned
 from nldyn.bifurcations.rigid_touch import Touches
 from nldyn.bifurcations.sign_changes import accounted
 from nldyn.bifurcations.touching import rigid_touches
 from nldyn.orbits.bordered import Corrected, Free, OrbitFamily, correct, length_unit
 from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit, minimal_period
-from nldyn.orbits.shooting import FROM_NEAR, ShootingProblem, asymmetry, metric_length
+from nldyn.orbits.shooting import BROKEN, FROM_NEAR, ShootingProblem, asymmetry, metric_length
 
 SLIGHT = 1e-5, 1e-4, 1e-3  # first impacts and misses looked for, depth over the orbit's size
 SLIGHTER = 1e-6, 1e-7  # misses, where the motion at the touch hardly changes with the frequency
-FOLLOWED = 2e-6  # least impact with which a branch can begin: slower ones are not followed
-SLIGHT_BY_DIFFERENCES = 2e-3, 1e-2  # where they serve as derivatives by the parameter
+SLIGHTEST = 1e-6  # impact that is followed: multipliers go with its inverse
+FOLLOWED = 2.0 * SLIGHTEST  # least impact with which a branch can begin
+DIFFERENCED = 1e-3  # slightest impact that is followed where differences serve as derivatives
+SLIGHT_BY_DIFFERENCES = 2.0 * DIFFERENCED, 10.0 * DIFFERENCED
 AS_ASKED = 0.1  # relative difference of the depth found from it
 LIMITS = 10.0  # over the largest multiplier: how far others may be from their limits at grazing
-SYMMETRIC = 1e-8  # relative asymmetry of an orbit that is rounding
 PROPORTIONAL = 0.2  # most by which the way from the grazing is not in proportion to the depth
 
 
@@ -177,7 +178,7 @@ def _ahead(touches: Touches, exact: Orbit, before: Orbit) -> Beside | None:
         return Beside((not come[0],), 0, (1.0,))
     form, m = RootMap.of(touches), len(come)
     shifts = range(0, m, m * minimal_period(exact) // exact.period)
-    mirrored = exact.system.symmetric and asymmetry(exact.problem, exact.point) < SYMMETRIC
+    mirrored = exact.system.symmetric and asymmetry(exact.problem, exact.point) < BROKEN
     turns = [*shifts, *((shift + m // 2) % m for shift in shifts if mirrored)]
 
     def kept(hits: tuple[bool, ...]) -> list[bool]:
@@ -188,11 +189,6 @@ def _ahead(touches: Touches, exact: Orbit, before: Orbit) -> Beside | None:
     others = [each for each in others if each.hits not in same]
     kinds = {min(turned(each.hits, shift) for shift in shifts) for each in others}
     return others[0] if len(kinds) == 1 else None
-
-
-def turned(hits: tuple[bool, ...], by: int) -> tuple[bool, ...]:
-    """Touches in the order of time, beginning with another one."""
-    return hits[by:] + hits[:by]
 
 
 def crosses_beside(at: Orbit, beside: Orbit, slightest: float = SLIGHT[-1]) -> bool:

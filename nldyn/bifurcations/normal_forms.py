@@ -33,7 +33,7 @@ from nldyn.bifurcations.normal_form_coefficients import (
     torus,
 )
 from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special
-from nldyn.bifurcations.rigid_grazing import RigidGrazing, RootMap
+from nldyn.bifurcations.rigid_grazing import RigidGrazing, RootMap, turned
 from nldyn.bifurcations.rigid_touch import Touches
 from nldyn.orbits.conditions import AT_NODE, Grazing
 from nldyn.orbits.orbit import Orbit, minimal_period
@@ -539,7 +539,7 @@ def _several_grazings(special: SpecialPoint, touches: Touches, form: RootMap) ->
     sides = []
     for side in (1, -1):
         kinds = {  # one of those that are the same but for when they begin
-            max(each.hits[turn:] + each.hits[:turn] for turn in range(0, count, every)): None
+            max(turned(each.hits, turn) for turn in range(0, count, every)): None
             for each in beside
             if each.side == side
         }

@@ -49,18 +49,21 @@ class Beside:
     amounts: tuple[float, ...]
 
 
+def turned(hits: tuple[bool, ...], by: int) -> tuple[bool, ...]:
+    """Touches in the order of time, beginning with another one."""
+    return hits[by:] + hits[:by]
+
+
 @dataclass(frozen=True, eq=False)
 class RootMap:
     """The map of the motion beside a grazing, from touch to touch.
 
     Parameters
     ----------
+    touches : Touches
+        What it is of.
     jacobians : (m, 2n, 2n)
         From each touch to the next.
-    by_parameter : (m, 2n)
-        Derivatives of the motion there by the parameter's coordinate.
-    own : (m,)
-        Those of the heights of the same states.
     rows, kicks : (m, 2n)
         c and b of the touches.
     losses, decelerations : (m,)
@@ -72,9 +75,8 @@ class RootMap:
     (1997), *Proc. R. Soc. A* 453, 1261-1276.
     """
 
+    touches: Touches
     jacobians: Real
-    by_parameter: Real
-    own: Real
     rows: Real
     kicks: Real
     losses: Real
@@ -100,26 +102,25 @@ class RootMap:
         decelerations = -omega * (rates * pace).sum(1)
         if not (decelerations > 0.0).all():
             raise CoefficientError("the motion does not turn at the stop")
-        return cls(
-            np.array(flights),
-            touches.by_parameter(lambda beside: beside.flights(states)),
-            touches.by_parameter(lambda beside: beside.heights),
-            rows, touches.kicks, touches.losses(np.full(len(rows), SLIGHT)), decelerations,
-        )  # fmt: skip
+        losses = touches.losses(np.full(len(rows), SLIGHT))
+        return cls(touches, np.array(flights), rows, touches.kicks, losses, decelerations)
 
     @cached_property
     def heights(self) -> tuple[Real, Real]:
         """Derivatives of the heights of periodic motions by x (m,) and by the speeds (m, m)."""
         m, n = self.rows.shape
+        states = self.touches.states
+        by_parameter = self.touches.by_parameter(lambda beside: beside.flights(states))
+        own = self.touches.by_parameter(lambda beside: beside.heights)
         matrix, right = np.eye(m * n), np.zeros((m * n, m + 1))
         for i, follows in enumerate([*range(1, m), 0]):
             before, behind = slice(i * n, (i + 1) * n), slice(follows * n, (follows + 1) * n)
             matrix[behind, before] -= self.jacobians[i]
-            right[behind, 0] = self.by_parameter[i]
+            right[behind, 0] = by_parameter[i]
             right[behind, i + 1] = -self.losses[i] * (self.jacobians[i] @ self.kicks[i])
         ways = np.linalg.solve(matrix, right).reshape(m, n, m + 1)
         found = np.einsum("mn,mnk->mk", self.rows, ways)
-        return found[:, 0] + self.own, found[:, 1:]
+        return found[:, 0] + own, found[:, 1:]
 
     def effect(self, first: int) -> float:
         """Of an impact on its own touch, a period later: c A b."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError
+from nldyn.flow.flow_map import Segments
 from nldyn.orbits.bordered import Evaluation, OrbitFamily
 from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit
@@ -172,20 +173,26 @@ class Touches:
 
     def shoot(self, state: Real, first: float, last: float) -> tuple[Real, Real]:
         """State (2n,) at another phase, past the stops around the touches; Jacobian (2n, 2n)."""
-        change, phases = self.at.change, np.array([first, last])
-        if change is not None:
-            state = change[0] @ state
-        found = shoot_past(
-            self.problem, self.passages, state[None], phases, self.omega, True, size=self.size
-        )
-        end, jacobian = found.ends[0], found.jacobians[0]
-        if change is None:
-            return end, jacobian
-        return change[1] @ end, change[1] @ jacobian @ change[0]
+        end, found = self._shot(state, first, last, True)
+        jacobian, change = found.jacobians[0], self.at.change
+        return end, jacobian if change is None else change[1] @ jacobian @ change[0]
 
     def end(self, state: Real, first: float, last: float) -> Real:
         """State (2n,) at another phase, past the stops around the touches."""
-        return self.shoot(state, first, last)[0]
+        return self._shot(state, first, last, False)[0]
+
+    def _shot(
+        self, state: Real, first: float, last: float, sensitivities: bool
+    ) -> tuple[Real, Segments]:
+        """State (2n,) at another phase, and the segment in the system's own coordinates."""
+        change, phases = self.at.change, np.array([first, last])
+        begin = state if change is None else change[0] @ state
+        found = shoot_past(
+            self.problem, self.passages, begin[None], phases, self.omega, sensitivities,
+            size=self.size,
+        )  # fmt: skip
+        end = found.ends[0]
+        return end if change is None else change[1] @ end, found
 
     def flights(self, states: Real) -> Real:
         """States (m, 2n) at the next touches of motions from states at these."""

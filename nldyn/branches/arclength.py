@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_types
 from nldyn.base.rows import Rows
+from nldyn.bifurcations.beyond_rigid_grazing import SLIGHTEST
 from nldyn.bifurcations.branch_crossing import (
     ON_CROSSING,
     SHORTEST_CROSSING,
@@ -36,17 +37,22 @@ from nldyn.orbits.impact_phases import (
     start_far_from_impacts,
 )
 from nldyn.orbits.orbit import Orbit
-from nldyn.orbits.shooting import FROM_NEAR, ShootingProblem, asymmetry, metric_length, shifts
+from nldyn.orbits.shooting import (
+    BROKEN,
+    FROM_NEAR,
+    ShootingProblem,
+    asymmetry,
+    metric_length,
+    shifts,
+)
 
 KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes
-BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding,
-BY_TOLERANCE = 1.0  # or, over the tolerance of the flow map, more than its error (0.3 at most seen)
+BY_TOLERANCE = 1.0  # asymmetry over the tolerance of the flow map: its error (0.3 at most seen)
 EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
 MEETING_STEP = 1e-4  # longest step over which a doubled branch may meet the one it comes from
 LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # steps from a crossing, over `SHORTEST_CROSSING`
 FARTHEST_CROSSING = 1e-4  # distance of one from which a step may begin
 GRAZES = 1e-4  # depth over size at which a walk that cannot go on is at a grazing of a rigid stop
-SLIGHTEST = 1e-6  # impact with one that is followed: multipliers go with its inverse
 NEAR_NODE = 1e-4  # rad from an impact to a phase of shooting, from which a short step may pass it
 FARTHEST_NODE = 0.3  # rad, the same for a step of any length
 FASTEST = 20.0  # rad by which an impact's phase changes at most, over the arclength

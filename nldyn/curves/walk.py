@@ -10,12 +10,12 @@ import numpy as np
 
 from nldyn.base.arrays import SLACK, TINY, Real
 from nldyn.base.errors import ConvergenceError, SystemModelError
+from nldyn.bifurcations.beyond_rigid_grazing import DIFFERENCED, SLIGHTEST
 from nldyn.bifurcations.period_doubling import passed_flip
 from nldyn.branches.arclength import (
     BESIDE_STEP,
     FARTHEST_OFF,
     GRAZES,
-    SLIGHTEST,
     grazes_rigid,
     grazing_between,
     loses_impact,
@@ -45,7 +45,6 @@ SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)  # of a step that leads over a phase of shoo
 # The condition of a Neimark-Sacker point holds for neutral saddles, too, and some may be near: the
 # cosine of the pair's angle changes by no more than this from point to point.
 TURN = 0.1
-DIFFERENCED = 1e-3  # slightest impact that is followed where differences serve as derivatives
 
 
 def _grazes_rigid(here: CurvePoint, least: float, most: float) -> StopReason | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -295,10 +294,6 @@ class Grazing:
             if depth > -TOGETHER * self.unit:
                 together.append(other)
         return replace(self, others=tuple(together))
-
-    def defined(self, family: OrbitFamily, _: Orbit) -> tuple[OrbitFamily, Condition]:
-        """The family in which this is solved, with the condition, as `defined_by` gives them."""
-        return family.past(self.passages), self
 
     @property
     def passages(self) -> tuple[Passage, ...]:
@@ -647,7 +642,7 @@ def grazing_beside(orbit: Orbit, family: OrbitFamily) -> Corrected | None:
     except SystemModelError:
         return None
     for grazing in (together, alone) if together.others else (alone,):
-        found = _solved(orbit, family, grazing.defined)
+        found = _solved(orbit, family.past(grazing.passages), grazing)
         if found is None:
             continue
         try:
@@ -660,18 +655,18 @@ def grazing_beside(orbit: Orbit, family: OrbitFamily) -> Corrected | None:
 
 def _beside(kind: str, orbit: Orbit, first_step: float = math.inf) -> Corrected | None:
     """The special point of a kind beside an orbit."""
-    return _solved(orbit, OrbitFamily.in_frequency(orbit), partial(defined_by, kind), first_step)
+    try:
+        family, condition = defined_by(kind, OrbitFamily.in_frequency(orbit), orbit)
+    except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+        return None
+    return _solved(orbit, family, condition, first_step)
 
 
 def _solved(
-    orbit: Orbit,
-    family: OrbitFamily,
-    define: Callable[[OrbitFamily, Orbit], tuple[OrbitFamily, Condition]],
-    first_step: float = math.inf,
+    orbit: Orbit, family: OrbitFamily, condition: Condition, first_step: float = math.inf
 ) -> Corrected | None:
     """What meets a condition beside an orbit, in the family in which that is solved."""
     try:
-        family, condition = define(family, orbit)
         guess = family.unknowns(orbit)
         found = correct(family, guess, condition, first_step=first_step)
     except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
@@ -694,7 +689,8 @@ def defined_by(kind: str, family: OrbitFamily, orbit: Orbit) -> tuple[OrbitFamil
         condition = BranchPointCondition.of(family.at(guess))
         return family.unfolded(condition.left * family.scale(guess)), condition
     if kind == "GR":
-        return Grazing.of(orbit).defined(family, orbit)
+        grazing = Grazing.of(orbit)
+        return family.past(grazing.passages), grazing
     if kind in KINDS:
         if kind == "NS" and orbit.system.size < 2:
             raise SystemModelError("a Neimark-Sacker point needs at least two modes")

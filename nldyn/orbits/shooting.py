@@ -27,6 +27,7 @@ FROM_NEAR = 8  # the same from a point that was predicted or nearly found: more 
 LOOSE = 1e-3  # relative length of a last step from which on nothing shows that there is an orbit
 AT_REST = 1e-6  # size of an orbit, relative to the guess, that may be rounding
 MUCH_SMALLER = 0.1  # of the start: an orbit whose steps are to be judged anew
+BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding
 
 
 @dataclass(frozen=True)

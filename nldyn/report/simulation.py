@@ -41,7 +41,7 @@ def write_simulation(
     observed = check_observe(motion.system, None)
     hz, peaks = motion.period_peaks(observed)
     samples = PER_PERIOD * max(hz.size, 1)
-    curve = Curve(observed, math.ceil(samples / BARS) if samples > DRAWN else 1)
+    curve = Drawn(observed, math.ceil(samples / BARS) if samples > DRAWN else 1)
     with result_directory(directory, "simulation") as folder:
         pieces = motion.histories(samples, curve.each * max(AT_ONCE // curve.each, 1))
         write_pieces(map(curve.seen, pieces), folder / "motion.csv")
@@ -59,7 +59,7 @@ def write_simulation(
 
 
 @dataclass
-class Curve:
+class Drawn:
     """What is drawn of a motion: of every so many samples the lowest and the highest."""
 
     interface: str
@@ -81,7 +81,7 @@ class Curve:
         return history
 
 
-def plot_motion(curve: Curve) -> Axes:
+def plot_motion(curve: Drawn) -> Axes:
     """Draw the displacement of an interface over the time."""
     time, values = np.concatenate(curve.times), np.concatenate(curve.values)
     factor, unit = length_unit(float(abs(values).max()))

@@ -137,7 +137,7 @@ def build_reduced(
         return selection.reduced
     pieces = 1 if isinstance(component, cms.Matrices) else fem.pieces_of(component.model).count
     hint = f"; the mesh is in {pieces} pieces that share no node" if pieces > 1 else ""
-    coupled = scene.matrices is not None and scene.matrices.has_skew
+    coupled = scene.matrices is not None and bool(scene.matrices.skew)
     with told_as(scene, ("reduction",), cms.ReductionError, hint=hint):
         reduced = cms.reduce(
             component,

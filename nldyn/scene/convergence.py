@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from nldyn.runtime.progress import Progress
     from nldyn.scene.schema import Scene
 
-SKEW = ("gyroscopic", "circulatory", "spin")
-
 
 def convergence_study_of(
     scene: Scene,
@@ -131,10 +129,9 @@ def _check_no_skew(scene: Scene) -> None:
     """Refuse matrices that couple what the others do not: a load case knows nothing of them."""
     parts = [(("components", name), part) for name, part in scene.component_scenes.items()]
     for above, part in [((), scene), *parts]:
-        for key in SKEW:
-            if part.matrices is not None and getattr(part.matrices, key) is not None:
-                fault = "couples the modes, which a convergence study does not know: leave it out"
-                raise scene_error(scene.file, (*above, "matrices", key), fault)
+        for key in part.matrices.skew if part.matrices else ():
+            fault = "couples the modes, which a convergence study does not know: leave it out"
+            raise scene_error(scene.file, (*above, "matrices", key), fault)
 
 
 def with_mesh(scene: Scene, file: str) -> Scene:

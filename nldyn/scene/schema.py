@@ -510,9 +510,10 @@ class MatricesTable(Table):
     """[kg] `loads.NAME = ...`: load vector M r of a weight or a moving base along r."""
 
     @property
-    def has_skew(self) -> bool:
-        """Whether a gyroscopic or a circulatory matrix couples what mass and stiffness do not."""
-        return any(one is not None for one in (self.gyroscopic, self.circulatory, self.spin))
+    def skew(self) -> tuple[str, ...]:
+        """Keys of what couples, as a skew matrix, what mass and stiffness do not."""
+        keys = ("gyroscopic", "circulatory", "spin")
+        return tuple(key for key in keys if getattr(self, key) is not None)
 
 
 class DampingTable(Table):

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from nldyn import ConstantForce, System, simulate
 from nldyn.app.cli import main
-from nldyn.report.simulation import Curve
+from nldyn.report.simulation import Drawn
 
 SCENE = """
 [matrices]
@@ -131,7 +131,7 @@ def test_pieces_of_a_long_motion_are_the_whole_and_a_picture_of_it_is_as_high():
         [[1.0]], [[1.0]], {"x": [1.0]}, excitation=[ConstantForce("x", 1.0)]
     )
     motion = simulate(system, 0.1, 5)
-    curve = Curve("x", each=7)
+    curve = Drawn("x", each=7)
     pieces = [curve.seen(piece) for piece in motion.histories(1000, 91)]
     assert [piece.time.size for piece in pieces] == 11 * [91]
     whole = motion.history(1000)
