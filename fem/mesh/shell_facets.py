@@ -5,15 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fem.base.arrays import IntArray
+from fem.mesh.shell_centres import OPEN
 
 FACETS: dict[str, dict[str, tuple[tuple[int, ...], ...]]] = {
     "triangle": {"triangle": ((0, 1, 2),)},
     "triangle6": {"triangle": ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))},
     "quad": {"quad": ((0, 1, 2, 3),)},
-    "quad8": {
-        "triangle": ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7)),
-        "quad": ((4, 5, 6, 7),),
-    },
     "quad9": {"quad": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3))},
 }
 """How a cell of a kind is cut into facets with three or four nodes."""
@@ -24,8 +21,8 @@ def facets_of(kinds: dict[str, IntArray]) -> dict[str, IntArray]:
 
     Examples
     --------
-    >>> facets_of({"quad8": np.arange(8)[None]})["quad"]
-    array([[4, 5, 6, 7]])
+    >>> facets_of({"quad9": np.arange(9)[None]})["quad"][0]
+    array([0, 4, 8, 7])
     """
     found: dict[str, list[IntArray]] = {}
     for kind, cells in kinds.items():
@@ -36,11 +33,11 @@ def facets_of(kinds: dict[str, IntArray]) -> dict[str, IntArray]:
 
 
 def shell_kinds() -> set[str]:
-    """Names of the kinds of cells of which a shell may be.
+    """Names of the kinds of cells of which a shell may be; those of eight nodes get a ninth.
 
     Examples
     --------
     >>> sorted(shell_kinds())
     ['quad', 'quad8', 'quad9', 'triangle', 'triangle6']
     """
-    return set(FACETS)
+    return {OPEN, *FACETS}

@@ -16,6 +16,7 @@ from fem.mesh.doubled import check_no_doubles
 from fem.mesh.element_types import check_family, counted
 from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.lost import check_nothing_lost
+from fem.mesh.shell_centres import with_centres
 from fem.mesh.shell_facets import facets_of, shell_kinds
 from fem.mesh.structure_mesh import StructureMesh, structure_mesh
 from fem.model.parts import BeamPart, ShellPart, SolidPart, TrussPart
@@ -62,7 +63,8 @@ class StructureModel:
     Parameters
     ----------
     mesh
-        A mesh with all kinds of cells; of a `FrameMesh` the lines are taken.
+        A mesh with all kinds of cells; of a `FrameMesh` the lines are taken. Here shells of
+        ``quad8`` get a node in the middle of each cell, after those of the mesh.
     parts
         By the name of the group of cells: `SolidPart` for bodies, `ShellPart` for triangles and
         quadrilaterals in space, `BeamPart` and `TrussPart` for lines. With plane solids everything
@@ -128,6 +130,8 @@ class StructureModel:
             given, what = getattr(self, name), f"by name, of {words}"
             object.__setattr__(self, name, by_name(self.mesh.source, name, given, sort, what))
         self._check_parts()
+        shells = [name for name, part in self.parts.items() if isinstance(part, ShellPart)]
+        object.__setattr__(self, "mesh", with_centres(self.mesh, shells))
         self._check_pinned()
         object.__setattr__(self, "mesh", self._with_coupled_points())
         self._check_plane()

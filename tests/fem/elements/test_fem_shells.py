@@ -8,6 +8,7 @@ from structures import CLAMP, STEEL, cantilever, flexibility, lowest_hz
 import cms
 import fem
 from fem.elements.shells import corner_normals
+from fem.mesh.shell_centres import with_centres
 from fem.mesh.shell_facets import shell_kinds
 from fem.render.colouring import surface_values
 from fem.render.structure_surface import structure_surface
@@ -23,7 +24,8 @@ def distorted(kind, seed=0):
     inner = ((points[:, :2] > 1e-9) & (points[:, :2] < 1 - 1e-9)).all(axis=1)
     amount = 0.08 if kind in ("quad", "triangle") else 0.02
     points[inner, :2] += amount * np.random.default_rng(seed).uniform(-1, 1, (inner.sum(), 2))
-    return mesh.with_points(points), inner
+    filled = with_centres(mesh.with_points(points), ["shell"])
+    return filled, np.append(inner, np.ones(len(filled.points) - len(inner), dtype=bool))
 
 
 def turned(points):
@@ -308,6 +310,38 @@ def test_a_shell_that_goes_on_along_the_solid_is_clamped(recwarn):
     )
     clamped = 3.5160 / (2 * np.pi) * np.sqrt(E * 1e-4 / (12 * (1 - NU**2) * RHO))
     assert lowest_hz(fem.assemble(beam), 1)[0] < lowest_hz(lapped, 1)[0] < clamped
+
+
+def test_a_strip_of_eight_node_cells_bends_as_a_beam_in_both_directions():
+    """A cantilever of 6 m x 0.2 m x 0.1 m in one row of six cells, against Euler's beam."""
+    strip = fem.box_mesh("strip", (6.0, 0.2), (6, 1), kind="quad8")
+    held = [fem.Support("x0", CLAMP)]
+    model = fem.StructureModel(strip, {"strip": fem.ShellPart(STEEL, 0.1)}, supports=held)
+    wanted = 1.8751041**2 / (2 * np.pi * 36) * np.sqrt(E / RHO / 12) * np.array([0.1, 0.2])
+    np.testing.assert_allclose(lowest_hz(fem.assemble(model), 2), wanted, rtol=0.01)
+
+
+def test_middle_nodes_of_cells_belong_to_the_names_that_hold_the_cells():
+    strip = fem.box_mesh("strip", (6.0, 1.0), (6, 1), kind="quad8")
+    mesh = fem.StructureMesh(
+        strip.points,
+        strip.cells,
+        {"shell": {"quad8": np.array([1, 2, 4])}, "skin": {"quad8": np.array([0, 2, 3])}},
+        {"third": strip.cells["quad8"][2], "edge": strip.nodes("y0")},
+        element_types={"S8": {"quad8": np.arange(6)}},
+    )
+    found = with_centres(mesh, ["shell"])
+    middles = found.points[found.cells["quad9"]].mean(axis=1)[:, 0]
+    np.testing.assert_allclose(middles, [1.5, 2.5, 4.5])
+    others = found.points[found.cells["quad8"]].mean(axis=1)[:, 0]
+    np.testing.assert_allclose(others, [0.5, 3.5, 5.5])
+    np.testing.assert_allclose(found.points[-3:], [[1.5, 0.5, 0], [2.5, 0.5, 0], [4.5, 0.5, 0]])
+    centre = len(strip.points) + 1
+    assert found.part("skin")["quad8"].tolist() == [0, 1]
+    assert found.part("skin")["quad9"].tolist() == [1]
+    assert centre in found.nodes("third") and len(found.nodes("third")) == 9
+    assert found.nodes("edge").tolist() == mesh.nodes("edge").tolist()
+    assert found.element_types["S8"]["quad9"].tolist() == [0, 1, 2]
 
 
 PLATE = fem.ShellPart(STEEL, 0.01)
