@@ -24,6 +24,7 @@ from nldyn.system.naming import stop_name
 from nldyn.system.rigid_stop import AnyStop
 
 if TYPE_CHECKING:
+    from nldyn.bifurcations.point import SpecialPoint
     from nldyn.branches.branch import Branch
     from nldyn.orbits.orbit import Orbit
     from nldyn.search.diagram import Diagram
@@ -112,16 +113,20 @@ def branch_curve(
         neighbour is, so that the drawn stability changes at the special point itself.
     """
     located = [(node.arclength, node.orbit, node.orbit.stable) for node in branch.nodes]
-    lengths = [length for length, _, _ in located]
     for special in branch.special_points:
-        after = int(np.searchsorted(lengths, special.point.arclength))
-        neighbours = branch.nodes[max(after - 1, 0) : after + 1]
-        stable = any(node.orbit.stable for node in neighbours)
+        stable = beside_stable(branch, special)
         located.append((special.point.arclength, special.orbit, stable))
     located.sort(key=lambda entry: entry[0])
     hz = np.array([orbit.frequency_hz for _, orbit, _ in located], dtype=float)
     y = np.array([orbit.max_abs_displacement for _, orbit, _ in located], dtype=float)
     return hz, y, np.array([stable for _, _, stable in located], dtype=bool)
+
+
+def beside_stable(branch: Branch, special: SpecialPoint) -> bool:
+    """Whether a point next to a special point along its branch is stable."""
+    lengths = [node.arclength for node in branch.nodes]
+    after = int(np.searchsorted(lengths, special.point.arclength))
+    return any(node.orbit.stable for node in branch.nodes[max(after - 1, 0) : after + 1])
 
 
 def length_unit(largest: float) -> tuple[float, str]:
@@ -170,6 +175,21 @@ def period_name(period: int) -> str:
     '1/3 subharmonic'
     """
     return "harmonic" if period == 1 else f"1/{period} subharmonic"
+
+
+def orbit_title(orbit: Orbit, digits: int = 6) -> str:
+    """Say of an orbit whether it is stable, its period and its frequency.
+
+    Examples
+    --------
+    >>> from nldyn import System, Unbalance, solve_orbit
+    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
+    ...     excitation=[Unbalance("middle", 4.92e-6)])
+    >>> orbit_title(solve_orbit(system, frequency_hz=10.0))
+    'stable harmonic orbit at 10 Hz'
+    """
+    name = f"{orbit.stability.verdict} {period_name(orbit.period)} orbit"
+    return f"{name} at {orbit.frequency_hz:.{digits}g} Hz"
 
 
 def plot_diagram(
@@ -282,7 +302,7 @@ def plot_orbit(
     ...     stops=[Stop("middle", stiffness=5.17e9)], excitation=[Unbalance("middle", 4.92e-6)])
     >>> displacement, force = plot_orbit(solve_orbit(system, frequency_hz=25.3))
     >>> displacement.get_title()
-    'harmonic orbit at 25.3 Hz'
+    'stable harmonic orbit at 25.3 Hz'
     """
     history = orbit.history(samples)
     upper, lower = axes if axes is not None else new_axes_pair()
@@ -290,8 +310,7 @@ def plot_orbit(
     _draw_displacement(upper, history.time, history.displacement[orbit.observe], places)
     _draw_forces(lower, history.time, history.force, orbit.system.stops)
     _mark_deepest((upper, lower), [impact.time for impact in orbit.impact_list])
-    name = period_name(orbit.period)
-    upper.set_title(f"{name} orbit at {orbit.frequency_hz:.6g} Hz")
+    upper.set_title(orbit_title(orbit))
     lower.set_xlabel("time (s)")
     return upper, lower
 

@@ -17,7 +17,7 @@ from nldyn.plot.diagram import (
     UNSTABLE,
     length_unit,
     new_axes,
-    period_name,
+    orbit_title,
     stop_places,
 )
 from nldyn.system.naming import stop_name
@@ -237,8 +237,7 @@ def force_unit(largest: float) -> tuple[float, str]:
 
 def _axes(ax: Axes | None, orbit: Orbit) -> Axes:
     ax = ax if ax is not None else new_axes(9.5, 4.8)
-    stability = "stable" if orbit.stable else "unstable"
-    ax.set_title(f"{stability} {period_name(orbit.period)} orbit at {orbit.frequency_hz:.6g} Hz")
+    ax.set_title(orbit_title(orbit))
     return ax
 
 

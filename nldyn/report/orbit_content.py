@@ -16,14 +16,15 @@ from nldyn.base.errors import ConvergenceError
 from nldyn.branches.branch import Branch
 from nldyn.orbits.harmonics import harmonics
 from nldyn.orbits.orbit import Orbit
-from nldyn.plot.diagram import MARKER_NAMES, period_name, stop_places
+from nldyn.plot.diagram import MARKER_NAMES, beside_stable, orbit_title, stop_places
 from nldyn.plot.orbit import FLOOR, drawn_phases, motion_at
 from nldyn.system.naming import stop_name
 
-MOST_ORBITS = 120
-SPECIAL_SHARE = 2 / 3  # of them, at most, are those at special points
+MOST_POINTS = 120  # that can be looked at, beside the special points
+MOST_SPECIAL = 600
 STEPS = 300  # equal steps of a time history in each period of the excitation
-MOST_SAMPLES = 1500
+SAMPLES = (300, 1500)  # of a time history, at least and at most
+ALL_SAMPLES = 180_000  # of the time histories of a page, about
 SHOWN_INSTANTS = 36  # of a period, at which the structure is shown deflected
 
 
@@ -53,7 +54,7 @@ class ChosenOrbit:
 
 
 def chosen_orbits(
-    branches: Sequence[Branch], heights: Sequence[Sequence[float]], most: int = MOST_ORBITS
+    branches: Sequence[Branch], heights: Sequence[Sequence[float]], most: int = MOST_POINTS
 ) -> list[ChosenOrbit]:
     """Choose orbits to show: at special points, at the highest points, and evenly spaced ones.
 
@@ -64,13 +65,14 @@ def chosen_orbits(
     heights : sequence of sequence of float
         The largest displacements of the points of each branch.
     most : int
-        About how many; every branch has at least its highest point, whatever this is.
+        About how many points beside the special ones; every branch has at least its highest point
+        and its highest stable one, whatever this is.
 
     Returns
     -------
     list of ChosenOrbit
-        In order along the branches. Where there are more special points than two thirds of `most`,
-        evenly spaced ones are taken.
+        In order along the branches. All special points, or where there are more than
+        `MOST_SPECIAL` those beside a stable orbit and evenly spaced ones of the others.
 
     Examples
     --------
@@ -82,19 +84,31 @@ def chosen_orbits(
     >>> found[0].name, found[-1].place == len(branch.points) - 1
     ('point 0', True)
     """
-    special = [
-        _at_special(branch, number, index)
-        for number, branch in enumerate(branches)
-        for index in range(len(branch.special_points))
-    ]
-    special = [special[i] for i in even(len(special), int(SPECIAL_SHARE * most))]
-    share = (most - len(special)) / max(sum(len(branch.points) for branch in branches), 1)
+    kept: list[ChosenOrbit] = []
+    others: list[ChosenOrbit] = []
+    for number, branch in enumerate(branches):
+        for index, special in enumerate(branch.special_points):
+            into = kept if beside_stable(branch, special) else others
+            into.append(_at_special(branch, number, index))
+    kept = [kept[i] for i in even(len(kept), MOST_SPECIAL)]
+    kept += [others[i] for i in even(len(others), MOST_SPECIAL - len(kept))]
+    share = most / max(sum(len(branch.points) for branch in branches), 1)
     points = [
         ChosenOrbit(number, float(i), f"point {i}", branch.points[i])
         for number, (branch, y) in enumerate(zip(branches, heights, strict=True))
-        for i in sorted({int(np.argmax(y)), *even(len(y), int(share * len(y)))})
+        for i in sorted({*_highest(branch, y), *even(len(y), int(share * len(y)))})
     ]
-    return sorted([*special, *points], key=lambda chosen: (chosen.branch, chosen.place))
+    return sorted([*kept, *points], key=lambda chosen: (chosen.branch, chosen.place))
+
+
+def _highest(branch: Branch, heights: Sequence[float]) -> set[int]:
+    """Numbers of the highest point, and of the highest stable one if there is any."""
+    highest = int(np.argmax(heights))
+    stable = np.flatnonzero(branch.stable)
+    return {
+        highest,
+        *([int(stable[np.argmax(np.asarray(heights)[stable])])] if stable.size else []),
+    }
 
 
 def even(count: int, most: int) -> list[int]:
@@ -117,10 +131,22 @@ def _at_special(branch: Branch, number: int, index: int) -> ChosenOrbit:
     return ChosenOrbit(number, after - 0.5, name, special.orbit, index)
 
 
-def orbit_content(chosen: ChosenOrbit) -> dict[str, Any]:
+def samples_each(orbits: int) -> int:
+    """How many samples of a time history each of so many orbits of a page has.
+
+    Examples
+    --------
+    >>> samples_each(20), samples_each(300), samples_each(5000)
+    (1500, 600, 300)
+    """
+    return int(np.clip(ALL_SAMPLES // max(orbits, 1), *SAMPLES))
+
+
+def orbit_content(chosen: ChosenOrbit, samples: int = SAMPLES[1]) -> dict[str, Any]:
     """What a page shows of an orbit, ready for JSON; arrays are packed as 32-bit numbers.
 
-    In SI units. What cannot be computed is told under ``fault``, and then the rest is missing.
+    In SI units, at about so many instants of a period. What cannot be computed is told under
+    ``fault``, and then the rest is missing.
     """
     orbit = chosen.orbit
     told = {
@@ -131,19 +157,19 @@ def orbit_content(chosen: ChosenOrbit) -> dict[str, Any]:
         "period": orbit.period,
         "hz": float(orbit.frequency_hz),
         "y": float(orbit.max_abs_displacement),
-        "title": f"{orbit.stability.verdict} {period_name(orbit.period)} orbit "
-        f"at {orbit.frequency_hz:.7g} Hz",
+        "title": orbit_title(orbit, digits=7),
+        "stable": bool(orbit.stable),
     }
     try:
-        return {**told, **_motion(orbit), **_spectrum(orbit), **_figures(orbit)}
+        return {**told, **_motion(orbit, samples), **_spectrum(orbit), **_figures(orbit)}
     except ConvergenceError as error:
         return {**told, "fault": str(error)}
 
 
-def _motion(orbit: Orbit) -> dict[str, Any]:
+def _motion(orbit: Orbit, samples: int) -> dict[str, Any]:
     """Displacement, velocity and contact forces over a period, and all impacts."""
-    phases = drawn_phases(orbit, min(STEPS * orbit.period, MOST_SAMPLES // 2))
-    phases = phases[even(phases.size, MOST_SAMPLES)]
+    phases = drawn_phases(orbit, min(STEPS * orbit.period, samples // 2))
+    phases = phases[even(phases.size, samples)]
     states = drawn_states(orbit, phases)
     y, speed = orbit.system.displacement(orbit.observe, states, phases, orbit.omega)
     start = motion_at(orbit, orbit.observe, 2.0 * math.pi * np.arange(orbit.period, dtype=float))

@@ -32,6 +32,7 @@ from nldyn.report.orbit_content import (
     known,
     modal_motion,
     orbit_content,
+    samples_each,
     stops_of,
 )
 from nldyn.search.diagram import Diagram
@@ -123,7 +124,8 @@ def page_content(
     chosen = chosen_orbits(branches, heights)
     kept = kept_points(branches)
     notes = [*notes, *dict.fromkeys(diagram.notes), *limits(diagram, chosen, kept)]
-    orbits = [orbit_content(each) for each in chosen]
+    samples = samples_each(len(chosen))
+    orbits = [orbit_content(each, samples) for each in chosen]
     content: dict[str, Any] = {
         "title": (scene.title if scene else "") or "Bifurcation diagram",
         "range_hz": list(diagram.range_hz),
@@ -257,6 +259,11 @@ def limits(
         f"{len(chosen)} orbits can be looked at: those of {shown} of {special} special points and "
         f"of {len(chosen) - shown} of {points} points, evenly spaced (the dots)."
     ]
+    if shown < special:
+        said.append(
+            "Of special points those beside a stable orbit come first, evenly spaced ones of the "
+            "others follow; a click on one that is not kept says so."
+        )
     drawn = sum(map(len, kept))
     if drawn < points:
         said.append(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.errors import SceneError
+from nldyn.plot.diagram import orbit_title
 from nldyn.report.again import drawn_of
 from nldyn.report.modes import check_modes, mode_table
 from nldyn.report.results import write_table
@@ -79,8 +80,8 @@ def render_scene(
         or ``.mp4``; also ``mode_shapes.html`` and ``deepest_contact.html``, to be turned in a
         browser. All of them or nothing.
     frequency_hz : float, optional
-        Excitation frequency of the orbit in Hz; unless given, where the harmonic branch has its
-        largest displacement.
+        Excitation frequency of the orbit in Hz; unless given, where the stable harmonic orbits
+        have their largest displacement.
     period : int
         Period of the orbit in periods of the excitation, if a frequency is given.
     video : {"gif", "mp4"}
@@ -158,7 +159,10 @@ def orbit_to_draw(
     progress: Progress | None = None,
     jobs: int = 1,
 ) -> Orbit:
-    """Find the orbit to draw: at a frequency, or where the harmonic orbits are largest."""
+    """Find the orbit to draw: at a frequency, or where the stable harmonic orbits are largest.
+
+    Where none is stable, the largest of all.
+    """
     from nldyn.base.errors import ConvergenceError
     from nldyn.orbits.solve import solve_orbit
     from nldyn.search.diagram import diagram
@@ -174,7 +178,7 @@ def orbit_to_draw(
     orbits = [orbit for branch in found.branches for orbit in branch.points]
     if not orbits:
         raise SceneError(f"{scene.file}: no harmonic orbit is found from {low:g} to {high:g} Hz")
-    return max(orbits, key=lambda orbit: orbit.max_abs_displacement)
+    return max(orbits, key=lambda orbit: (orbit.stable, orbit.max_abs_displacement))
 
 
 def deepest_impact(scene: Scene, orbit: Orbit) -> Impact | None:
@@ -420,7 +424,7 @@ class Drawing:
         write_page(
             self.component,
             self.reduced.expand(deepest_state(orbit, impact))[:, None],
-            [f"{what} at {orbit.frequency_hz:.4g} Hz"],
+            [f"{what} of the {orbit_title(orbit)}"],
             self.folder / "deepest_contact.html",
             heading=self.scene.title or "Deepest contact",
             mirror=_mirror(self.scene),
@@ -507,7 +511,7 @@ class Drawing:
                 self.component,
                 state,
                 self.folder / f"deepest_{name}.png",
-                title=f"{what} at {orbit.frequency_hz:.4g} Hz",
+                title=f"{what} of the {orbit_title(orbit)}",
                 scale=self.visible_scale(state, impact.penetration if impact else 0.0, stop),
                 stop=stop,
                 mirror=_mirror(self.scene),
@@ -537,7 +541,7 @@ class Drawing:
             self.reduced.expand(history.modal[:-1].T).T,
             self.folder / f"motion.{video}",
             times=history.time[:-1],
-            title=f"one period of the orbit at {orbit.frequency_hz:.4g} Hz",
+            title=f"one period of the {orbit_title(orbit)}",
             stop=stop_to_draw(self.scene, deepest_impact(self.scene, orbit)),
             mirror=_mirror(self.scene),
             view=self.view,

@@ -121,7 +121,7 @@ def test_orbit_shows_displacement_impacts_and_force():
     orbit = solve_orbit(system, frequency_hz=25.3)
     upper, lower = plot_orbit(orbit)
     assert upper.get_ylabel() == "displacement (µm)"
-    assert upper.get_title() == "harmonic orbit at 25.3 Hz"
+    assert upper.get_title() == "stable harmonic orbit at 25.3 Hz"
     assert lower.get_ylabel() == "contact force (N)"
     assert upper.get_legend().get_texts()[0].get_text() == "deepest contact"
     y = upper.lines[1].get_ydata()

@@ -15,7 +15,7 @@ from nldyn import Stop, System, Unbalance, diagram, load
 from nldyn.app.cli import main
 from nldyn.base.resources import example
 from nldyn.io.branches import save_branches
-from nldyn.report import offline
+from nldyn.report import offline, orbit_content
 from nldyn.report import page as pages
 from nldyn.report.again import kept_surface
 from nldyn.report.deflection import surface_content
@@ -144,7 +144,7 @@ def test_a_large_diagram_is_thinned_and_the_page_says_so(results, monkeypatch):
     (numbers_,) = kept_points(found.branches)
     assert len(numbers_) == 10 and (numbers_[0], numbers_[-1]) == (0, count - 1)
     said = pages.limits(found, [], [numbers_])
-    assert said[1].startswith(f"The diagram is thinned: it shows 10 of {count} points")
+    assert said[-1].startswith(f"The diagram is thinned: it shows 10 of {count} points")
 
 
 def test_the_moves_of_modes_add_up_to_the_deflected_surface():
@@ -250,3 +250,18 @@ def test_the_structure_of_the_page_before_is_kept_where_the_mesh_is_not_found(re
     assert kept_surface(tmp_path / "nowhere.html", found) is None
     page.write_text("no page of ours", encoding="utf-8")
     assert kept_surface(page, found) is None
+
+
+def test_special_points_beside_stable_orbits_are_kept_first(results, monkeypatch):
+    """And of every branch the highest stable orbit, below the highest of all."""
+    found = load(results / "branches.h5")
+    heights = [branch.max_abs_displacement for branch in found.branches]
+    (flip,) = [p for branch in found.branches for p in branch.special_points if p.kind == "PD"]
+    for most, kept in ((600, len(found.branches[0].special_points)), (1, 1)):
+        monkeypatch.setattr(orbit_content, "MOST_SPECIAL", most)
+        chosen = orbit_content.chosen_orbits(found.branches, heights, most=0)
+        assert len([each for each in chosen if each.special >= 0]) == kept
+        assert any(each.orbit is flip.orbit for each in chosen)
+        stable = [each.orbit.max_abs_displacement for each in chosen if each.orbit.stable]
+        branch = found.branches[0]
+        assert max(stable) == max(branch.max_abs_displacement[branch.stable])
