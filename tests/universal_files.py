@@ -7,12 +7,13 @@ from fem.mesh.cells import KINDS
 
 UNV_NUMBERS = {"line": 21, "line3": 24, "triangle": 91, "triangle6": 92, "quad": 94, "quad8": 95}
 UNV_NUMBERS |= {"tetra": 111, "tetra10": 118, "wedge": 112, "wedge15": 113, "hexahedron": 115}
-UNV_NUMBERS |= {"hexahedron20": 116}
+UNV_NUMBERS |= {"hexahedron20": 116, "pyramid": 312, "pyramid13": 114}
 UNV_RINGS = {
     "line3": ((0,), (1,)),
     "triangle6": ((0, 1, 2),),
     "quad8": ((0, 1, 2, 3),),
     "tetra10": ((0, 1, 2), (3,)),
+    "pyramid13": ((0, 1, 2, 3), (4,)),
     "wedge15": ((0, 1, 2), (3, 4, 5)),
     "hexahedron20": ((0, 1, 2, 3), (4, 5, 6, 7)),
 }

@@ -24,6 +24,9 @@ KINDS = {
 }  # fmt: skip
 """Kinds of cells by MED's name; its nodes are in VTK's order, but for the handedness of solids."""
 
+OLDEST = 3
+"""The oldest version that is read."""
+
 SYSTEMS = {1: "cylindrical", 2: "spherical"}
 """MED's other systems of coordinates, by their numbers."""
 
@@ -38,7 +41,7 @@ def read_med(path: Path) -> meshio.Mesh:
     Parameters
     ----------
     path
-        Version 3 or later (HDF5).
+        Version 3 or later (HDF5), of a whole mesh.
 
     Returns
     -------
@@ -49,8 +52,9 @@ def read_med(path: Path) -> meshio.Mesh:
     Raises
     ------
     ModelError
-        If it is not a MED file, is not in Cartesian coordinates, holds several meshes or steps, or
-        cells of a kind that is not read.
+        If it is not a MED file, is of an older version, is not in Cartesian coordinates, holds
+        several meshes or steps, one piece of a mesh (with joints), or cells of a kind that is not
+        read.
 
     References
     ----------
@@ -63,11 +67,18 @@ def read_med(path: Path) -> meshio.Mesh:
     except OSError:
         raise ModelError(f"{path}: is not a MED file, or is cut off") from None
     with file:
+        _check_version(path, file)
         if "ENS_MAA" not in file:
             raise ModelError(f"{path}: is not a MED file with a mesh (there is no ENS_MAA)")
         names = list(file["ENS_MAA"])
         if len(names) != 1:
             raise ModelError(f"{path}: holds {len(names)} meshes, not one: {quoted(names)}")
+        joints = list(file.get(f"JNT/{names[0]}", ()))
+        if joints:
+            raise ModelError(
+                f"{path}: is one piece of a mesh that is cut up for several processes, with the"
+                f" joints {quoted(joints)} to others; join the pieces and save the whole mesh"
+            )
         mesh = file["ENS_MAA"][names[0]]
         _check_cartesian(path, mesh)
         step = mesh if "NOE" in mesh else _only_step(path, mesh)
@@ -75,6 +86,17 @@ def read_med(path: Path) -> meshio.Mesh:
         content = _content(path, step, families, int(mesh.attrs["ESP"]))
         content.info = _stated_unit(mesh)
         return content
+
+
+def _check_version(path: Path, file: Any) -> None:
+    """Refuse files of MED 2, in which families and steps lie elsewhere."""
+    said = file["INFOS_GENERALES"].attrs if "INFOS_GENERALES" in file else {}
+    version = [int(said.get(part, 0)) for part in ("MAJ", "MIN", "REL")]
+    if 0 < version[0] < OLDEST:
+        raise ModelError(
+            f"{path}: is of MED {'.'.join(map(str, version))}, and {OLDEST} or later is read; MED's"
+            " program medimport makes it one, or open it in Salome and save it"
+        )
 
 
 def _check_cartesian(path: Path, mesh: Any) -> None:

@@ -1,4 +1,4 @@
-"""Cells that meshio 5.3 lists for its formats but cannot hold, so that they are read or named.
+"""Cells and numbers that meshio 5.3 leaves out of its tables, so that they are read or named.
 
 Without this a `meshio.Mesh` of "wedge15" or "pyramid13" is a `KeyError`, whatever the format.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from meshio._common import num_nodes_per_cell
 from meshio._mesh import topological_dimension
+from meshio.vtk import _vtk_42, _vtk_51
 
 LEFT_OUT = {
     "pixel": (2, 4),
@@ -24,3 +25,14 @@ LEFT_OUT = {
 for _kind, (_dimension, _count) in LEFT_OUT.items():
     topological_dimension.setdefault(_kind, _dimension)
     num_nodes_per_cell.setdefault(_kind, _count)
+
+NUMBERS = {
+    **_vtk_51.vtk_to_numpy_dtype_name,
+    **_vtk_42.vtk_to_numpy_dtype_name,
+    "signed_char": "int8",
+    "vtkidtype": "int32",
+}
+"""Kinds of numbers of all versions of VTK legacy files; vtkIdType is written as int."""
+
+_vtk_42.vtk_to_numpy_dtype_name.update(NUMBERS)
+_vtk_51.vtk_to_numpy_dtype_name.update(NUMBERS)

@@ -32,13 +32,14 @@ READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
     ".vtu": ("VTK", read_vtu),
     ".vtk": ("VTK", read_vtk),
     ".med": ("MED", read_med),
-    ".unv": ("universal", read_unv),
 }
 DECK = ".inp"
 """The extension of files that hold more than a mesh."""
 NASTRAN = (".bdf", ".nas")
+UNIVERSAL = ".unv"
 ARCHIVE = ".cdb"
-EXTENSIONS = (*READERS, DECK, *NASTRAN)
+EXTENSIONS = (*READERS, UNIVERSAL, DECK, *NASTRAN)
+PROGRAMS = {DECK: "Abaqus", UNIVERSAL: "universal", **dict.fromkeys(NASTRAN, "Nastran")}
 
 
 def read_mesh(
@@ -157,16 +158,19 @@ def _read(
             solids, left_out = read_nastran(path)
             content, said = without_cells(solids, ignore, str(path))
             return replace(_noted(build(content, str(path)), said), left_out=left_out)
-        whole = READERS[extension][1](path)
+        whole, left_out = (
+            read_unv(path) if extension == UNIVERSAL else (READERS[extension][1](path), [])
+        )
         content, said = without_cells(whole, ignore, str(path))
-        return _noted(_with_unit(build(content, str(path)), whole.info), said)
+        mesh = _noted(_with_unit(build(content, str(path)), whole.info), said)
+        return replace(mesh, left_out=left_out)
     except ModelError:
         raise
     except (Exception, SystemExit) as error:
         reason = reason_of(error)
         if "zero-size array" in reason:
             raise ModelError(f"{path}: the mesh is empty, it has no elements") from error
-        kind = "Abaqus" if extension == DECK else READERS.get(extension, ("Nastran",))[0]
+        kind = PROGRAMS[extension] if extension in PROGRAMS else READERS[extension][0]
         raise ModelError(f"{path}: cannot be read as {kind} mesh ({reason})") from error
 
 

@@ -30,6 +30,18 @@ LEGACY_ARRAY = re.compile(
     rb"^(?:SCALARS +)?(set\S+) +(?:\d+ +\d+ +)?[a-z]\w*(?: +\d+)?[ \r]*$", re.MULTILINE
 )
 """The line before an array of marks in a VTK legacy file, of a FIELD or by itself."""
+LEGACY_DATA = re.compile(
+    rb"^(?:(?:POINT|CELL)_DATA[ \t]+(?P<count>\d+)"
+    rb"|NORMALS[ \t]+(?P<normals>\S+[ \t]+\S+)"
+    rb"|TENSORS6[ \t]+(?P<tensors>\S+)[ \t]+(?P<tensor>\S+)"
+    rb"|TEXTURE_COORDINATES[ \t]+(?P<places>\S+)[ \t]+(?P<axes>\d)[ \t]+(?P<place>\S+)"
+    rb"|(?:GLOBAL|PEDIGREE)_IDS[ \t]+(?P<labels>\S+)[ \t]+(?P<label>\S+)"
+    rb"|COLOR_SCALARS[ \t]+(?P<colours>\S+)[ \t]+(?P<shades>\d+))[ \t\r]*$",
+    re.MULTILINE | re.IGNORECASE,
+)
+"""Lines before data of a VTK legacy file that meshio does not take, and how many there are."""
+LEGACY_TABLE = re.compile(rb"^LOOKUP_TABLE[ \t]+\S+[ \t]+(\d+)[ \t\r]*\n", re.MULTILINE | re.I)
+"""The line before a table of colours, of four bytes or four numbers each."""
 
 
 def read_vtu(path: Path) -> meshio.Mesh:
@@ -97,7 +109,12 @@ def read_vtk(path: Path) -> meshio.Mesh:
     for arrays in re.split(rb"^(?:POINT|CELL)_DATA\b", whole, flags=re.MULTILINE)[1:]:
         _check_each_once([unquote(name) for name in LEGACY_ARRAY.findall(arrays)], path)
     try:
-        content = _without_warning(meshio.vtk.read, path)
+        with TemporaryDirectory() as folder:
+            readable = path
+            if (plain := _as_fields(whole)) != whole:
+                readable = Path(folder) / "mesh.vtk"
+                readable.write_bytes(plain)
+            content = _without_warning(meshio.vtk.read, readable)
     except KeyError as error:
         raise ModelError(
             f"{path}: holds numbers of the type {error}, which are not read of VTK legacy files;"
@@ -113,6 +130,41 @@ def read_vtk(path: Path) -> meshio.Mesh:
             data[unquote(name)] = data.pop(name)
     _check_no_ghosts(content, path)
     return content
+
+
+def _as_fields(whole: bytes) -> bytes:
+    """A VTK legacy file whose normals, colours, labels and the like are arrays as others are.
+
+    They lie in the file as an array does that its number of columns and of rows tells of.
+    """
+    count = b"0"
+    binary = whole.split(b"\n", 3)[2].strip().upper() == b"BINARY"
+    shade = b"unsigned_char" if binary else b"double"
+    while table := LEGACY_TABLE.search(whole):
+        values = rb"[\s\S]{%d}" if binary else rb"(?:\s*\S+){%d}"
+        end = re.compile(values % (4 * int(table[1]))).match(whole, table.end())
+        whole = whole[: table.start()] + whole[end.end() if end else table.end() :]
+
+    def field(name: bytes, columns: bytes, kind: bytes) -> bytes:
+        return b" ".join([b"FIELD FieldData 1\n" + name, columns, count, kind])
+
+    def told(found: re.Match[bytes]) -> bytes:
+        nonlocal count
+        part = found.groupdict()
+        if part["count"]:
+            count = part["count"]
+            return found[0]
+        if part["normals"]:
+            return b"VECTORS " + part["normals"]
+        if part["tensors"]:
+            return field(part["tensors"], b"6", part["tensor"])
+        if part["places"]:
+            return field(part["places"], part["axes"], part["place"])
+        if part["labels"]:
+            return field(part["labels"], b"1", part["label"])
+        return field(part["colours"], part["shades"], shade)
+
+    return LEGACY_DATA.sub(told, whole)
 
 
 def _check_no_ghosts(content: meshio.Mesh, path: Path) -> None:

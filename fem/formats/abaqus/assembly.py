@@ -10,7 +10,7 @@ from fem.base.errors import ModelError
 from fem.formats.abaqus.deck import Body, Deck, Scope
 from fem.formats.abaqus.elements import read_elcopy, read_elements, read_elgen
 from fem.formats.abaqus.keywords import Keyword
-from fem.formats.abaqus.known import ADVICE, LEFT_OUT, MATERIALS, READ, UNKNOWN
+from fem.formats.abaqus.known import ADVICE, LEFT_OUT, MATERIALS, OF_SECTION, READ, UNKNOWN
 from fem.formats.abaqus.nodes import (
     read_ncopy,
     read_nfill,
@@ -39,9 +39,13 @@ AT_ONCE: dict[str, Action] = {
 
 def read_scopes(deck: Deck, keywords: Iterable[Keyword]) -> None:
     """Read all keywords into the scopes that they stand in; note those that are refused."""
-    scope, in_material = deck.root, False
+    scope, in_material, section = deck.root, False, None
     for keyword in keywords:
         name = keyword.name
+        if name.endswith("SECTION"):
+            section = keyword
+        elif name in OF_SECTION and section is not None:
+            deck.changed.append((section, keyword))
         in_material = name == "MATERIAL" or (in_material and _of_material(name))
         if in_material:
             deck.materials.append(keyword)

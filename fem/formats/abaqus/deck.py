@@ -177,6 +177,8 @@ class Deck:
     problems: dict[str, Problem] = field(default_factory=dict)
     left_out: dict[str, Problem] = field(default_factory=dict)
     materials: list[Keyword] = field(default_factory=list)
+    changed: list[tuple[Keyword, Keyword]] = field(default_factory=list)
+    """Sections, each with a keyword after it that changes what it is."""
     generated: int = 0
     ignore: frozenset[str] = frozenset()
     ignored: set[str] = field(default_factory=set)

@@ -318,8 +318,6 @@ class Joints:
     def _tie_pairs(
         self, slaves: list[Label], masters: list[Label], keyword: Keyword, row: int
     ) -> None:
-        if not slaves or not masters:
-            raise keyword.fail("one of its surfaces holds no node", row)
         there = np.array([self.places[node] for node in masters])
         here = np.array([self.places[node] for node in slaves])
         size = float(np.ptp(np.vstack([there, here]), axis=0).max())

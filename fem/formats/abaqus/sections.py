@@ -157,6 +157,9 @@ def _described(
     families = {
         family(deck.bodies[owner.upper()].element(label).type.name) for owner, label in labels
     }
+    for section, change in deck.changed:
+        if section is keyword:
+            raise NotTakenError(f"has {change.shown} in {change.place()}, which is not taken over")
     if keyword.name.startswith("BEAM"):
         _check_plain_beams(deck)
     given = _TAKEN[keyword.name](body, keyword, families)
@@ -220,8 +223,8 @@ ORIENTING = ("NORMALS OF *NODE", "*NORMAL", "ORIENTATION NODES OF BEAMS")
 
 
 def _check_plain_beams(deck: Deck) -> None:
-    """Refuse beams whose axes or stiffness other keywords change."""
-    for what in (*ORIENTING, "*TRANSVERSE SHEAR STIFFNESS", "*TRANSVERSE SHEAR"):
+    """Refuse beams whose axes other keywords change."""
+    for what in ORIENTING:
         if what in deck.left_out:
             said = f"is of beams in a file with {what.lower()}"
             raise NotTakenError(f"{said}, which are not taken over")

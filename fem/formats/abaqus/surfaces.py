@@ -35,7 +35,10 @@ class Surfaces:
 
     def nodes(self, body: Body, name: str, keyword: Keyword) -> list[Label]:
         """Nodes of a surface by name, of a body or of an instance (INSTANCE.NAME)."""
-        return self.of(*self._found(body, name, keyword))
+        found = self.of(*self._found(body, name, keyword))
+        if not found:
+            raise keyword.fail(f"names the surface {name!r}, which holds no node")
+        return found
 
     def by_nodes(self, body: Body, name: str, keyword: Keyword) -> bool:
         """Whether a surface by name is of nodes and not of faces."""
@@ -94,7 +97,9 @@ class Surfaces:
         if kind not in ("ELEMENT", "NODE"):
             raise keyword.fail(f"a surface of type {kind} is not read")
         if not keyword.rows:
-            raise keyword.fail("has no data line")
+            name = keyword.name_of("NAME")
+            reason = "it has no data line, so no face and no node"
+            self.resolver.deck.leave_out(f"*SURFACE {name}", keyword.place(), reason)
         if "INSTANCE" in keyword.parameters:
             body = self.resolver.body(keyword.parameters["INSTANCE"], keyword.place())
         pieces: list[list[Label]] = []

@@ -761,8 +761,6 @@ def test_the_docs_list_every_keyword_where_it_belongs():
 @pytest.mark.parametrize(
     ("keyword", "row"),
     [
-        ("*SURFACE, NAME=S", "S1"),
-        ("*SURFACE, NAME=S, TYPE=NODE", "1.0"),
         ("*MPC", "1, 2"),
         ("*KINEMATIC COUPLING, REF NODE=1", "1, 3"),
     ],
@@ -774,6 +772,55 @@ def test_a_row_without_its_first_word_is_told_with_its_line(tmp_path, keyword, r
         fem.read_mesh(deck(tmp_path, f"{text}{keyword}\n"))
     with pytest.raises(fem.ModelError, match=f"line {line + 1}: .*nothing before its first comma"):
         fem.read_mesh(deck(tmp_path, f"{text}{keyword}\n, {row}\n"))
+
+
+def test_a_surface_without_data_is_told_and_nothing_can_use_it(tmp_path):
+    text = cantilever_deck()
+    line = text.count("\n") + 1
+    for kind, row in (("ELEMENT", "S1"), ("NODE", "1.0")):
+        surface = f"{text}*SURFACE, NAME=Empty, TYPE={kind}\n"
+        mesh = fem.read_mesh(deck(tmp_path, surface))
+        assert "Empty" not in mesh.point_sets or not len(mesh.point_sets["Empty"])
+        told = f"*SURFACE Empty (1, first in line {line}): it has no data line"
+        assert any(str(item).startswith(told) for item in mesh.left_out)
+        with pytest.raises(fem.ModelError, match=f"line {line + 1}: .*nothing before its first"):
+            fem.read_mesh(deck(tmp_path, f"{surface}, {row}\n"))
+    used = surface + "*COUPLING, CONSTRAINT NAME=C, REF NODE=1, SURFACE=EMPTY\n*KINEMATIC\n"
+    with pytest.raises(fem.ModelError, match="names the surface 'EMPTY', which holds no node"):
+        fem.read_mesh(deck(tmp_path, used))
+
+
+@pytest.mark.parametrize(
+    "change", ["*BEAM SECTION OFFSET\n0., 0.3\n", "*TRANSVERSE SHEAR STIFFNESS\n1E6, 1E6\n"]
+)
+def test_what_changes_a_section_after_it_is_refused_by_name(tmp_path, change):
+    text = cantilever_deck() + (
+        "*MATERIAL, NAME=M\n*ELASTIC\n2.1E11, .3\n*DENSITY\n7800.\n"
+        "*BEAM SECTION, ELSET=BEAM, MATERIAL=M, SECTION=RECT\n0.02, 0.01\n"
+    )
+    shell = (
+        "*NODE\n91, 0, 0, 1\n92, 1, 0, 1\n93, 0, 1, 1\n*ELEMENT, TYPE=S3, ELSET=SHELL\n"
+        "91, 91, 92, 93\n*SHELL SECTION, ELSET=SHELL, MATERIAL=M\n0.1\n"
+    )
+    plain = fem.read_structure(deck(tmp_path, text + shell)).described
+    assert {plain[name]["kind"] for name in ("BEAM", "SHELL")} == {"beam", "shell"}
+    told = f"has {change.split(chr(10))[0]} in line".replace("*", r"\*")
+    for changed, name in ((text + change + shell, "BEAM"), (text + shell + change, "SHELL")):
+        described = fem.read_structure(deck(tmp_path, changed)).described
+        assert re.search(told, described[name]["refused"])
+        other = "SHELL" if name == "BEAM" else "BEAM"
+        assert described[other] == plain[other]
+
+
+def test_controls_of_sections_are_no_part_of_the_material_before_them(tmp_path):
+    text = cantilever_deck() + (
+        "*MATERIAL, NAME=M\n*ELASTIC\n2.1E11, .3\n*DENSITY\n7800.\n"
+        "*SECTION CONTROLS, NAME=EC-1, HOURGLASS=ENHANCED\n1., 1., 1.\n"
+        "*BEAM SECTION, ELSET=BEAM, MATERIAL=M, SECTION=RECT\n0.02, 0.01\n"
+    )
+    mesh = fem.read_mesh(deck(tmp_path, text))
+    assert mesh.described["BEAM"]["density"] == 7800.0
+    assert "*SECTION CONTROLS" in [item.keyword for item in mesh.left_out]
 
 
 def test_an_empty_set_is_read_as_one(tmp_path):

@@ -6,6 +6,7 @@ import h5py
 import meshio
 import numpy as np
 import pytest
+import pyvista as pv
 from structures import lowest_hz
 from universal_files import write_unv
 from with_gmsh import gmsh_at_work
@@ -231,6 +232,14 @@ def undefine_the_skin(file):
         ),
         (lose_families, "H20 has 8 members, but families for 7"),
         (undefine_the_skin, "QU8 is in family -5, which FAS does not define"),
+        (
+            lambda file: file.create_group("JNT/block/to_second"),
+            "is one piece of a mesh .* the joints 'to_second' to others",
+        ),
+        (
+            lambda file: file.create_group("INFOS_GENERALES").attrs.update(MAJ=2, MIN=3, REL=6),
+            r"is of MED 2\.3\.6, and 3 or later is read",
+        ),
     ],
 )
 def test_what_a_med_file_holds_otherwise_is_refused(tmp_path, change, said):
@@ -311,6 +320,120 @@ def test_a_vtk_legacy_file_that_is_not_understood_is_refused_with_advice(tmp_pat
     path.write_text(LEGACY.replace("POINTS 8 double", "POINTS 8 quaternion"))
     with pytest.raises(fem.ModelError, match=r"type 'quaternion', .* as '\.vtu'"):
         fem.read_structure(path)
+
+
+FIELD_UNV = {
+    "quadratic edge": """    -1
+  2411
+         1         1         1        11
+   0.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00
+         2         1         1        11
+   1.0000000000000000D+00   0.0000000000000000D+00   0.0000000000000000D+00
+         3         1         1        11
+   5.0000000000000000D-01   1.0000000000000000D-01   0.0000000000000000D+00
+    -1
+    -1
+  2412
+         7        22         2         1         7         3
+         0         1         1
+         1         3         2
+    -1
+""",
+    "empty groups": """    -1
+  2467
+         1         0         0         0         0         0         0         0
+first
+
+         2         0         0         0         0         0         0         1
+edge
+         8         7         0         0
+         3         0         0         0         0         0         0         0
+last
+
+    -1
+""",
+}
+
+
+def test_an_edge_and_empty_groups_of_salome_are_read(tmp_path):
+    path = tmp_path / "edge.unv"
+    path.write_text("".join(FIELD_UNV.values()))
+    mesh = fem.read_structure(path)
+    assert mesh.points[mesh.cells["line3"][0]][:, 0].tolist() == [0.0, 1.0, 0.5]
+    assert mesh.part("edge") == {"line3": [0]}
+    told = "; ".join(map(str, mesh.left_out))
+    assert "group 'first' (1, first in line 18): it is empty; group 'last' (1, first in" in told
+    assert "orientations and cross sections of beams (1, first in line 13)" in told
+
+
+@pytest.mark.parametrize("kind", ["pyramid", "pyramid13"])
+def test_pyramids_of_salome_are_read(tmp_path, kind):
+    own = KINDS_OF_CELLS[kind]
+    mesh = fem.StructureMesh(own.nodes, {kind: [range(own.node_count)]})
+    write_unv(mesh, tmp_path / "pyramid.unv")
+    found = fem.read_structure(tmp_path / "pyramid.unv")
+    assert found.cells[kind].tolist() == [list(range(own.node_count))]
+
+
+def test_properties_tell_the_elements_of_a_universal_file_without_groups_apart(tmp_path):
+    path = tmp_path / "beam.unv"
+    text = FIELD_UNV["quadratic edge"].replace("         7        22", "         7        24")
+    cell = text.split("  2412\n")[1].removesuffix("    -1\n")
+    other = cell.replace("         7        24         2", "         8        24         5")
+    for cells, groups in ((cell + cell.replace("  7   ", "  8   ", 1), []),
+                          (cell + other, ["property 2", "property 5"])):  # fmt: skip
+        path.write_text(text.replace(cell, cells))
+        mesh = fem.read_structure(path)
+        assert sorted(mesh.groups) == groups
+        told = [item.keyword for item in mesh.left_out]
+        assert ("physical properties of elements" in told) == bool(groups)
+    assert mesh.part("property 5") == {"line3": [1]}
+
+
+@pytest.mark.parametrize("binary", [False, True])
+@pytest.mark.parametrize("version", [42, 51])
+def test_all_data_that_vtk_writes_beside_a_mesh_is_passed(tmp_path, version, binary):
+    """Normals, colours, labels, tensors and arrays of all numbers hide no array of a set."""
+    from vtkmodules.vtkCommonCore import vtkLookupTable
+    from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
+
+    box = fem.box_mesh("block", (2.0, 1.0, 1.0), (2, 1, 1), kind="hexahedron")
+    grid = pv.UnstructuredGrid({pv.CellType.HEXAHEDRON: box.cells["hexahedron"]}, box.points)
+    for data, count in ((grid.GetPointData(), 12), (grid.GetCellData(), 2)):
+        values = iter(np.random.default_rng(0).random((20, count, 9)))
+
+        def array(name, columns, kind=float, values=values, count=count):
+            made = pv.convert_array((99 * next(values)[:, :columns]).astype(kind), name)
+            return made
+
+        colours = array("colours", 1)
+        table = vtkLookupTable()
+        table.SetNumberOfTableValues(5)
+        table.Build()
+        colours.SetLookupTable(table)
+        data.SetScalars(colours)
+        data.SetVectors(array("v", 3))
+        data.SetNormals(array("n", 3))
+        data.SetTCoords(array("places", 2))
+        data.SetTensors(array("six", 6))
+        data.SetGlobalIds(array("label", 1, np.int64))
+        data.SetPedigreeIds(array("origin", 1, np.int64))
+        for kind in ("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4"):
+            data.AddArray(array(kind, 2, kind))
+    data.AddArray(pv.convert_array(np.array([0, 1], dtype=np.int32), "set:right"))
+    writer = vtkUnstructuredGridWriter()
+    writer.SetInputData(grid)
+    writer.SetFileVersion(version)
+    writer.SetFileType(2 if binary else 1)
+    writer.SetFileName(str(tmp_path / "box.vtk"))
+    writer.Write()
+    found = fem.read_structure(tmp_path / "box.vtk")
+    assert (found.points == box.points).all()
+    assert (found.cells["hexahedron"] == box.cells["hexahedron"]).all()
+    assert found.part("right") == {"hexahedron": [1]}
+    data.SetScalars(array("rgb", 3, "u1"))
+    writer.Write()
+    assert fem.read_structure(tmp_path / "box.vtk").part("right") == {"hexahedron": [1]}
 
 
 def test_med_in_other_coordinates_is_refused_and_another_unit_told(tmp_path):
