@@ -1,9 +1,10 @@
-"""The errors that nldyn raises for bad input."""
+"""The errors that nldyn raises: for bad input, and for computations that fail."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from numbers import Integral, Real
 from reprlib import repr as shortened
 from typing import Any, TypeGuard
@@ -131,12 +132,44 @@ def check_whole(name: str, value: object, least: int, most: int | None = None) -
         raise SystemModelError(f"{name} must be a whole number {wanted}, got {shown(value)}")
 
 
-class ConvergenceError(RuntimeError):
+class ComputationError(RuntimeError):
+    """A computation that fails though what it was given is sound."""
+
+
+class ConvergenceError(ComputationError):
     """No orbit was found; the text says how far Newton's method came."""
 
 
-class LocateError(RuntimeError):
+class LocateError(ComputationError):
     """An orbit between two points of a branch could not be corrected."""
+
+
+# What a computation from sound input may end in: its steps may lead to numbers that no system can
+# have, that are too large, or to equations that have no solution.
+FAILURES = (ComputationError, SystemModelError, ArithmeticError, np.linalg.LinAlgError)
+
+
+@contextmanager
+def failing_as(kind: type[ComputationError]) -> Iterator[None]:
+    """Tell what a computation from sound input ends in as one kind of failure.
+
+    So that a number beyond all systems, met on the way, is not told as a fault of what was given.
+    It may be written above a function, too.
+
+    Examples
+    --------
+    >>> with failing_as(LocateError):
+    ...     math.exp(1e3)
+    Traceback (most recent call last):
+        ...
+    nldyn.base.errors.LocateError: math range error
+    """
+    try:
+        yield
+    except FAILURES as error:
+        if isinstance(error, kind):
+            raise
+        raise kind(str(error)) from error
 
 
 def must_be_symmetric(name: str) -> str:

@@ -15,8 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, LocateError, SystemModelError
-from nldyn.bifurcations.normal_form_coefficients import CoefficientError
+from nldyn.base.errors import FAILURES, ConvergenceError, LocateError, SystemModelError
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.rigid_grazing import MOST_TOUCHES, Beside, RootMap, turned
 from nldyn.bifurcations.rigid_touch import Touches
@@ -73,7 +72,7 @@ def orbit_beyond(exact: Orbit, before: Orbit, family: OrbitFamily) -> Corrected 
             return None
         shares = (*SLIGHT, *SLIGHTER) if family.is_exact else SLIGHT_BY_DIFFERENCES
         return first_beside(exact, touches, ahead, shares)
-    except (CoefficientError, ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+    except FAILURES:
         return None
 
 
@@ -112,7 +111,7 @@ def switch_at_rigid_grazing(special: SpecialPoint, times: int = 1) -> list[Branc
             for kind in kinds
             if any(kind.hits)
         ]
-    except (CoefficientError, ConvergenceError, np.linalg.LinAlgError) as error:
+    except FAILURES as error:
         raise LocateError(f"no orbit is found beside the grazing at {hz}: {error}") from None
     period = times * exact.period
     if not found:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import LocateError
+from nldyn.base.errors import LocateError, failing_as
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, SHORTEST_CROSSING
 from nldyn.bifurcations.normal_form_coefficients import correct_across
 from nldyn.bifurcations.point import BranchNode
@@ -59,6 +59,7 @@ class Chord:
                 row = depth
         return np.asarray(row / np.linalg.norm(row))
 
+    @failing_as(LocateError)
     def at(self, sigma: float) -> BranchNode:
         """Point of the branch on the plane through σ of the chord.
 

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, LocateError
+from nldyn.base.errors import FAILURES, LocateError
 from nldyn.bifurcations.branch_crossing import CROSSES, NEAR_CRITICAL
 from nldyn.bifurcations.chord import BEND, CROSSING_ERROR, Chord
 from nldyn.bifurcations.normal_form_coefficients import correct_across
@@ -125,7 +125,7 @@ def special_points_at_grazing(a: BranchNode, b: BranchNode) -> list[SpecialPoint
             crossing = orbits.at(first + share * (last - first))
             before = share < first / (first - last)
             found.insert(0 if before else 1, _special("BP", crossing, orbits.chord))
-    except (LocateError, ConvergenceError):
+    except FAILURES:
         return []
     return found if accounted(a.orbit, found, b.orbit) else []
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
+from nldyn.base.errors import FAILURES, ComputationError
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem
 
@@ -33,13 +34,14 @@ LEAST_ERROR = 1e-8  # relative, of a coefficient: special points are located no 
 DOUBLE = 1e-14  # cosine of left and right vectors, below which a multiplier is double
 NOT_NEAR = 0.1  # least over largest singular value, above which no critical orbit is near
 SOLVED = 1e-10  # last step of Newton's method, relative to the orbit
+FARTHEST = 0.5  # Newton step in ln ω that leads nowhere
 PLAIN = 0.01  # part of the frequency's derivative along the critical vector: no crossing is near
 
 Evaluation = tuple[Real, Real, Hashable]
 Vectors = NDArray[Any]  # real or complex
 
 
-class CoefficientError(RuntimeError):
+class CoefficientError(ComputationError):
     """A coefficient that cannot be computed; the text says why."""
 
 
@@ -302,6 +304,8 @@ def correct_across(
         rest = np.append(defect, [row @ point - offset, q @ (point - guess)[:size]])
         step = np.linalg.solve(bordered, -rest)
         point = point + step[:-1]
+        if not abs(step[size]) < FARTHEST:
+            return None
         moved = float(np.linalg.norm(step[:size])) / scale
         if moved < SOLVED:
             return point, found.jacobians, max(moved, abs(float(step[-1])) / scale)
@@ -323,7 +327,7 @@ def turns_near_crossing(orbit: Orbit) -> bool:
         if part > PLAIN * float(np.linalg.norm(y) * np.linalg.norm(loop.by_parameter)):
             return False  # a plain fold, at no further cost
         return part < NEAR_CROSSING * abs(mixed_derivative(loop, q, y).value)
-    except CoefficientError:
+    except FAILURES:
         return False
 
 

@@ -13,11 +13,12 @@ import numpy as np
 
 from nldyn.base.arrays import SLACK, Complex, Real
 from nldyn.base.errors import (
-    ConvergenceError,
+    FAILURES,
     LocateError,
     SystemModelError,
     check_positive,
     check_types,
+    failing_as,
 )
 from nldyn.bifurcations.normal_form_coefficients import (
     CoefficientError,
@@ -148,7 +149,7 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
         raise SystemModelError(f"no special point is of the kind {special.kind!r}")
     try:
         return kinds[special.kind](special, loop_of(special.orbit))
-    except CoefficientError as error:
+    except FAILURES as error:
         title, name = {
             "LP": ("Fold", "fold"),
             "PD": ("Flip", "flip"),
@@ -399,7 +400,7 @@ def switch_at_branch_point(
         )
     try:
         direction = other_tangent(special)
-    except CoefficientError as error:
+    except FAILURES as error:
         raise LocateError(f"no other branch at {_hz(special)}: {error}") from None
     return (
         _step_off(special, direction, amplitude),
@@ -425,6 +426,7 @@ def other_tangent(special: SpecialPoint) -> Real:
     return np.asarray(tangents[int(np.argmin(along))])
 
 
+@failing_as(LocateError)
 def _step_off(special: SpecialPoint, direction: Real, amplitude: float) -> BranchNode:
     """Point of the branch with a tangent at a distance from the branch point.
 
@@ -497,7 +499,7 @@ def _rigid_grazing(special: SpecialPoint, grazing: Grazing) -> NormalForm:
         if len(touches.stops) > 1:
             return _several_grazings(special, touches, root_map)
         form = RigidGrazing.of(root_map)
-    except (CoefficientError, ConvergenceError, SystemModelError, np.linalg.LinAlgError) as error:
+    except FAILURES as error:
         return NormalForm(
             "rigid grazing", f"Grazing at {hz}: rigid {alone} is just touched: no coefficient can "
             f"be given, {error}.",

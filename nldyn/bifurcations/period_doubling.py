@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import LocateError, check_positive
+from nldyn.base.errors import LocateError, check_positive, failing_as
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special
 from nldyn.orbits.conditions import nearest_flip
@@ -102,6 +102,12 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchNode
     """
     check_special("switch_at_flip", special, "PD", of_branch=False)
     check_positive("amplitude", amplitude)
+    with failing_as(LocateError):
+        return _beside_flip(special, amplitude)
+
+
+def _beside_flip(special: SpecialPoint, amplitude: float) -> BranchNode:
+    """The first point of the doubled branch that Newton's method finds."""
     orbit = special.orbit
     base = orbit.problem
     problem = ShootingProblem(base.flow, 2 * base.period, 2 * base.segments)

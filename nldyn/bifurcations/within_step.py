@@ -7,7 +7,7 @@ from functools import lru_cache
 from itertools import pairwise
 from operator import itemgetter
 
-from nldyn.base.errors import LocateError
+from nldyn.base.errors import LocateError, failing_as
 from nldyn.bifurcations.branch_crossing import ON_CROSSING, lies_on_crossing
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.crossing_at_grazing import special_points_at_grazing
@@ -32,6 +32,7 @@ DIVES = 8  # points at which to look for a change of sign between two others
 WITHIN = 0.02  # share of a step next to its ends, in which no point is put
 
 
+@failing_as(LocateError)
 def special_points_between(
     a: BranchNode,
     b: BranchNode,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, SystemModelError, check_types
+from nldyn.base.errors import FAILURES, ConvergenceError, check_types
 from nldyn.base.rows import Rows
 from nldyn.bifurcations.beyond_rigid_grazing import SLIGHTEST
 from nldyn.bifurcations.branch_crossing import (
@@ -65,6 +65,7 @@ SAME_PLACE = 1e-8  # distance of points that are one, relative to the orbit
 ROOM = 1.1  # times a bound: what is searched, where the bound itself is looked at later
 FARTHEST_OFF = 0.75  # of the largest angle: how far, over the step, a point may lie off the tangent
 NEAR_CROSSING = 0.1  # of the step: a crossing as near as this to its end is passed by another step
+BESIDE_RESONANCE = 1e-6  # relative distance from one, where steps are lost in rounding
 BESIDE_STEP = 0.01  # squared distance from a step, over its own, of what it passes through
 
 
@@ -177,7 +178,7 @@ def _past_impact_at_node(
             there = BranchNode(other, problem.tangent(found, by_frequency), here.arclength + step)
             if other.impacts == orbit.impacts and not differs(here, there):
                 return there, angle, 0.0
-    except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+    except FAILURES:
         pass
     return None
 
@@ -297,6 +298,10 @@ class Stepper:
 
     def too_short(self) -> StopReason:
         """The reason to stop where no step leads on."""
+        if self.stride is not None:
+            resonance = _resonance_beside(self.stride.here.orbit)
+            if resonance is not None:
+                return Ending.GROWS.told(hz=f"{resonance:.9g}")
         return Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
 
     def begin_anew(self, here: BranchNode, step: float) -> None:
@@ -538,6 +543,13 @@ class Stepper:
             np.array(shifts(problem, self.start.orbit.point)),
             np.array(shifts(problem, self.start.tangent)),
         )
+
+
+def _resonance_beside(orbit: Orbit) -> float | None:
+    """Frequency in Hz of an undamped mode at which a motion without contact grows, or None."""
+    if orbit.impacts or orbit.max_penetration > 0.0:
+        return None
+    return orbit.system.response(orbit.omega).resonance_hz(orbit.omega, BESIDE_RESONANCE)
 
 
 def _crossing_ahead(here: BranchNode) -> BranchNode | None:

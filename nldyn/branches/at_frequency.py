@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import LocateError, SystemModelError, check_frequency, shown
+from nldyn.base.errors import LocateError, SystemModelError, check_frequency, failing_as, shown
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.roots import root
@@ -161,6 +161,7 @@ def _log_frequency(point: BranchNode) -> float:
     return float(point.orbit.point[-1])
 
 
+@failing_as(LocateError)
 def _crossing(a: BranchNode, b: BranchNode, p: float) -> BranchNode:
     """Point between two neighbours with ln ω = p.
 

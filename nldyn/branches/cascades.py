@@ -8,9 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nldyn.base.errors import LocateError, SystemModelError, check_range, check_types, check_whole
+from nldyn.base.errors import (
+    FAILURES,
+    LocateError,
+    SystemModelError,
+    check_range,
+    check_types,
+    check_whole,
+)
 from nldyn.bifurcations.normal_form_coefficients import (
-    CoefficientError,
     Estimate,
     doubled_parameter,
     flip,
@@ -257,7 +263,7 @@ def _steps(
     gap = abs(flips[-1].frequency_hz / flips[-2].frequency_hz - 1.0) / FEIGENBAUM
     try:
         shift = doubled_parameter(flip(loop_of(flips[-1].orbit))[0]).value
-    except CoefficientError:
+    except FAILURES:
         shift = math.nan
     reach = math.sqrt(gap / abs(shift)) if shift else math.nan
     if not math.isfinite(reach):

@@ -20,6 +20,7 @@ class Ending(Enum):
     RANGE_END = "end of the frequency range"
     NO_ORBIT_AT_RANGE_END = "end of the range of {parameter}, where no orbit was found"
     PARAMETER_RANGE_END = "end of the range of {parameter}"
+    SCALES_TO_REST = "the orbits shrink in proportion to {parameter}, to rest where it is zero"
     CLOSED_BRANCH = "closed branch"
     CLOSED_CURVE = "closed curve"
     JOINS = "joins the branch of period {period} at the flip at {hz} Hz"
@@ -40,11 +41,13 @@ class Ending(Enum):
     DISSOLVED = "the branch point dissolves, as the symmetry does that brings it about"
     CORNER = "a stop is grazed, where the curve has a corner that is not followed"
     OTHER_EXTREME = "another extreme gets as large as the one held, where that has a corner"
+    GROWS = "grows without bound towards {hz} Hz, where an undamped mode resonates"
     GRAZES_RIGID = "grazes a rigid stop at {hz} Hz, where a multiplier tends to infinity"
     TO_REST = (
         "one more impact grazes at each of ever closer frequencies: near {hz} Hz they become a "
         "series without end, behind which the motion comes to rest"
     )
+    FAILS = "what lies beyond {hz} Hz could not be computed: {obstacle}"
     MOST_POINTS = "{points} points"
     SHORT_STEP = "step below {step}: {obstacle}"
     OTHER = "{sentence}"  # of an earlier version
@@ -99,9 +102,10 @@ class StopReason(str):
     @property
     def broken_off(self) -> bool:
         """Whether the branch goes on behind its end."""
-        return self.ending in (Ending.SHORT_STEP, Ending.MOST_POINTS)
+        return self.ending in BROKEN_OFF
 
 
+BROKEN_OFF = Ending.SHORT_STEP, Ending.MOST_POINTS, Ending.FAILS, Ending.GROWS
 StopReasons = tuple[StopReason, StopReason]
 
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 from operator import attrgetter
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, LocateError
+from nldyn.base.errors import FAILURES
 from nldyn.bifurcations.beyond_rigid_grazing import beyond_rigid_grazing, crosses_beside
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossing, without_repeats
 from nldyn.bifurcations.chord import Chord
@@ -124,8 +124,13 @@ class LegBuilder:
             Called after every point, when `so_far` tells of it.
         """
         while True:
-            self._follow(progress, keep)
-            if not self._passes_grazing():
+            try:
+                self._follow(progress, keep)
+                if not self._passes_grazing():
+                    break
+            except FAILURES as error:
+                hz = f"{self.nodes[-1].orbit.frequency_hz:.9g}"
+                self.walk.stop_reason = Ending.FAILS.told(hz=hz, obstacle=error)
                 break
             if progress is not None:
                 progress(self.nodes[-1].orbit.frequency_hz)
@@ -300,7 +305,7 @@ class LegBuilder:
             after = next(iter(self.nodes[self._searched + 2 :]), None)
             try:
                 self.special_points += special_points_between(a, b, before, after)
-            except (LocateError, ConvergenceError) as error:
+            except FAILURES as error:
                 if closely and self._walk_closely():
                     continue
                 found, lost = _by_halves(a, b, error)
@@ -466,7 +471,7 @@ def _by_halves(
         if depth > 3:
             raise reason
         middle = Chord(a, b).at(0.5)
-    except (LocateError, ConvergenceError) as error:
+    except FAILURES as error:
         low, high = (f"{hz:.8g}" for hz in sorted(p.orbit.frequency_hz for p in (a, b)))
         place = f"between {low} and {high}" if low != high else f"near {low}"
         return [], [f"special points {place} Hz may be missing: {error}"]
@@ -482,7 +487,7 @@ def _in_pieces(
     for a, b in pairwise(points):
         try:
             found += special_points_between(a, b)
-        except (LocateError, ConvergenceError) as error:
+        except FAILURES as error:
             more, lost = _by_halves(a, b, error, depth)
             found += more
             notes += lost

@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from nldyn.base.arrays import Complex, Real
-from nldyn.base.errors import ConvergenceError
-from nldyn.bifurcations.normal_form_coefficients import CoefficientError
+from nldyn.base.errors import FAILURES, ConvergenceError
 from nldyn.bifurcations.rigid_grazing import RootMap
 from nldyn.bifurcations.rigid_touch import Touches
 from nldyn.bifurcations.sign_changes import COMPLEX
@@ -78,7 +77,7 @@ def trace_of_impact(condition: Grazing, orbit: Orbit) -> float:
     """
     try:
         return RootMap.of(Touches.of(orbit, grazing=condition)).trace
-    except (CoefficientError, ConvergenceError):
+    except FAILURES:
         return math.nan
 
 

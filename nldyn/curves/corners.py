@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, SystemModelError
+from nldyn.base.errors import FAILURES, SystemModelError
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.curves.point import CurvePoint, curve_point
 from nldyn.orbits.bordered import (
@@ -72,7 +72,7 @@ def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePo
                 return [replace(corner, tangent=tangent), behind]
         tangent = _tangent_behind(found.at, here.condition, grazing, before < 0.0)
         return [replace(corner, tangent=tangent)]
-    except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+    except FAILURES:
         return []
 
 
@@ -85,7 +85,7 @@ def _behind(
     for depth in BEHIND:
         try:
             met = _meeting(at, condition, replace(grazing, depth=side * depth), farthest)
-        except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+        except FAILURES:
             continue
         if met is None:
             continue

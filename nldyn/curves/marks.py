@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, LocateError, check_whole
+from nldyn.base.errors import FAILURES, LocateError, check_whole
 from nldyn.bifurcations.beyond_rigid_grazing import (
     SLIGHT,
     SLIGHT_BY_DIFFERENCES,
@@ -193,6 +193,8 @@ class CurveChord:
 
 def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
     """What is met between two neighbouring points of a curve, in order, and what may be missing."""
+    if not (np.any(a.orbit.point[:-1]) and np.any(b.orbit.point[:-1])):
+        return [], []  # from rest on, of which the others are multiples
     if isinstance(a.condition, Free) and grazing_between(a.orbit, b.orbit):
         return _across_grazing(a, b)
     a, b = clear_of_nodes(a, b)
@@ -210,12 +212,12 @@ def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], lis
                 continue
             if _is_true(name, point):
                 found.append((sigma, _marked(name, point, error * (b.arclength - a.arclength))))
-        except (LocateError, ConvergenceError) as error:
+        except FAILURES as error:
             notes.append(_missing(name, a, error))
     for touches in _touches(a, b):
         try:
             found.append(_touched(touches, chord))
-        except (LocateError, ConvergenceError) as error:
+        except FAILURES as error:
             notes.append(_missing(_touch_name(a.condition), a, error))
     if b.corner:
         found.append((1.0, _marked(b.corner, b, b.found.step)))
@@ -229,7 +231,7 @@ def grazing_at_end(end: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
         return [], []
     try:
         return [_rigid_grazing(end)], []
-    except LocateError as error:
+    except FAILURES as error:
         return [], [_missing("GR", end, error)]
 
 
@@ -272,7 +274,7 @@ def _across_grazing(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], l
     near = min(a, b, key=lambda point: nearest_depth(point.orbit))
     try:
         grazing, notes = _rigid_grazing(near), []
-    except LocateError as error:
+    except FAILURES as error:
         return [], [_missing("GR", near, error)]
     slightest = (SLIGHT if a.found.at.family.is_exact else SLIGHT_BY_DIFFERENCES)[-1]
     if any(crosses_beside(grazing.orbit, side.orbit, slightest) for side in (a, b)):
@@ -297,7 +299,7 @@ def _touched(touches: Sequence[Touch], chord: CurveChord) -> tuple[float, Locate
         sigma, error = root(lambda x: touch.depth(chord.at(x)))  # type: ignore[arg-type]
         length = chord.last.arclength - chord.first.arclength
         return sigma, _marked(name, chord.at(sigma), error * length)
-    except (LocateError, ConvergenceError):
+    except FAILURES:
         for other in touches:
             met = _met_at_touch(name, chord, other)
             if met is not None:
@@ -394,7 +396,7 @@ def _marked(name: str, point: CurvePoint, error: float) -> LocatedPoint:
     if isinstance(point.condition, Free):
         try:
             return refine_special(mark, parameters[0])
-        except LocateError:
+        except FAILURES:
             return mark
     return mark
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError
+from nldyn.base.errors import FAILURES
 from nldyn.curves.codimension_two import codimension_tests
 from nldyn.orbits.bordered import Condition, Corrected, Evaluation, Free, correct
 from nldyn.orbits.conditions import Grazing
@@ -208,5 +208,5 @@ def on_plane(
         return None
     try:
         return curve_point(found, a.condition, way, a.arclength + length)
-    except ConvergenceError:
+    except FAILURES:
         return None

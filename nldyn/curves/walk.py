@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from nldyn.base.arrays import SLACK, TINY, Real
-from nldyn.base.errors import ConvergenceError, SystemModelError
+from nldyn.base.errors import FAILURES
 from nldyn.bifurcations.beyond_rigid_grazing import DIFFERENCED, SLIGHTEST
 from nldyn.bifurcations.period_doubling import passed_flip
 from nldyn.branches.arclength import (
@@ -41,6 +41,8 @@ UNFOLDED = 1e-6  # unfolding number from which a branch point has dissolved
 ALONG = 1e-12  # part of a unit tangent that is rounding
 FASTEST = 20.0  # change of an impact's phase with the arclength, at most, in rad
 CLEAR_OF_NODES = 3e-3  # rad from an impact to one, from which derivatives do not reach across it
+SCALES = 1e-8  # relative departure from a proportional change that is rounding
+MOST_OVER_NODE = 8  # steps, none of which leads clear of it where the impact moves slowly
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)  # of a step that leads over a phase of shooting
 # The condition of a Neimark-Sacker point holds for neutral saddles, too, and some may be near: the
 # cosine of the pair's angle changes by no more than this from point to point.
@@ -94,7 +96,11 @@ class CurveWalk:
             self.stop_reason = Ending.PARAMETER_RANGE_END.told(parameter=left)
             return
         ahead: list[CurvePoint] = []  # a corner, and what is behind it
+        before = None
         for _ in range(self.options.max_points):
+            if rest := before and self._scaled_to_rest(before, here):
+                yield rest
+                return
             attempt = None
             seen = bool(here.corner)
             if ahead:
@@ -130,7 +136,7 @@ class CurveWalk:
             curvature = (there.tangent - here.tangent) / (there.arclength - here.arclength)
             if there.corner or clear_of_nodes(here, there)[0] is not here:
                 curvature = np.zeros(here.tangent.size)
-            here = there
+            before, here = here, there
             step = self.options.next_step(step, angle, miss)
         self.stop_reason = Ending.MOST_POINTS.told(points=self.options.max_points)
 
@@ -146,13 +152,20 @@ class CurveWalk:
         try:
             shot = here.shot_from(start_far_from_impacts(here.orbit))
             none = np.zeros(here.tangent.size)
-            for share in SHARES:
-                beyond = self._straight_on(shot, none, share * step, seen)
-                if beyond is not None:
+            for _ in range(MOST_OVER_NODE):
+                first = None
+                for share in SHARES:
+                    beyond = self._straight_on(shot, none, share * step, seen)
+                    if beyond is None:
+                        continue
+                    first = first or beyond[0]
                     there = beyond[0].shot_from(0.0)
                     if nodes_to_impacts(there.orbit) > CLEAR_OF_NODES:
                         return there, *beyond[1:]
-        except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+                if first is None:
+                    break
+                shot = first
+        except FAILURES:
             pass
         return attempt
 
@@ -186,7 +199,7 @@ class CurveWalk:
             return None
         try:
             there = curve_point(found, here.condition, direction, here.arclength + step)
-        except ConvergenceError:
+        except FAILURES:
             return None
         cosine = float(direction @ (weights * there.tangent)) / metric_length(
             weights, there.tangent
@@ -263,6 +276,25 @@ class CurveWalk:
                     return end
         return None
 
+    def _scaled_to_rest(self, before: CurvePoint, here: CurvePoint) -> CurvePoint | None:
+        """Rest, at the end of a range at zero to which orbits shrink in proportion, or None.
+
+        They would do so for ever on the scale of their own size.
+        """
+        family, condition = here.found.at.family, here.condition
+        if len(family.charts) > 1 or not isinstance(condition, Free):
+            return None
+        if family.charts[0].low != 0.0 or here.tangent[-1] >= 0.0:
+            return None
+        if not (_scales(before) and _scales(here)):
+            return None
+        length = metric_length(family.metric(here.point), here.point)
+        rest = on_plane(here, -here.point, length, 0, 0.0)
+        if rest is not None:
+            name = family.charts[0].parameter.name
+            self.stop_reason = Ending.SCALES_TO_REST.told(parameter=name)
+        return rest
+
     def _end(self, here: CurvePoint, there: CurvePoint) -> list[CurvePoint] | None:
         """The last points of the walk if it ends in this step."""
         charts = here.found.at.family.charts
@@ -311,6 +343,13 @@ class CurveWalk:
             return False
         off = way - along / length2 * step
         return float(off @ (weights * off)) < BESIDE_STEP * length2
+
+
+def _scales(point: CurvePoint) -> bool:
+    """Whether the states of a curve in one parameter change in proportion to it."""
+    states, along = point.point[:-1], point.tangent[:-1]
+    off = states * point.tangent[-1] - along * point.point[-1]
+    return bool(np.abs(off).max() < SCALES * np.abs(along).max() * abs(point.point[-1]))
 
 
 def is_torus_curve(condition: Condition) -> bool:

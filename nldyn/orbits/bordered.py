@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, SystemModelError
+from nldyn.base.errors import FAILURES, ConvergenceError, SystemModelError
 from nldyn.flow.flow_map import FlowMap, Segments
 from nldyn.flow.options import FlowOptions
 from nldyn.orbits.orbit import Orbit
@@ -513,7 +513,7 @@ def correct(
                 found = Corrected(family.at(point), condition, step, iteration, "")
                 if found.residual(condition) < SATISFIED:
                     return found
-        except (ConvergenceError, SystemModelError, np.linalg.LinAlgError, OverflowError) as error:
+        except FAILURES as error:
             return Corrected(family.at(point), condition, step, iteration, str(error))
     failure = f"Newton's method did not converge, last relative step {step:.1e}"
     return Corrected(family.at(point), condition, step, max_iterations, failure)

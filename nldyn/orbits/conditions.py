@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, SystemModelError, is_finite, shown
+from nldyn.base.errors import FAILURES, ConvergenceError, SystemModelError, is_finite, shown
 from nldyn.flow.flow_map import Segments
 from nldyn.orbits.bordered import (
     DIFFERENCE,
@@ -368,7 +368,7 @@ def depth_row(orbit: Orbit) -> Real | None:
             return None
         phase, depth = touch.extreme(orbit)
         return touch.slope(orbit, phase) if abs(depth) <= TOUCH * touch.unit else None
-    except (SystemModelError, ConvergenceError):
+    except FAILURES:
         return None
 
 
@@ -657,7 +657,7 @@ def _beside(kind: str, orbit: Orbit, first_step: float = math.inf) -> Corrected 
     """The special point of a kind beside an orbit."""
     try:
         family, condition = defined_by(kind, OrbitFamily.in_frequency(orbit), orbit)
-    except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+    except FAILURES:
         return None
     return _solved(orbit, family, condition, first_step)
 
@@ -669,7 +669,7 @@ def _solved(
     try:
         guess = family.unknowns(orbit)
         found = correct(family, guess, condition, first_step=first_step)
-    except (ConvergenceError, SystemModelError, np.linalg.LinAlgError):
+    except FAILURES:
         return None
     apart = metric_length(family.metric(guess), found.at.point - guess)
     farthest = BESIDE if family.is_exact else BESIDE_BY_DIFFERENCES

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from nldyn.base.arrays import TINY, Real
-from nldyn.base.errors import ConvergenceError
+from nldyn.base.errors import FAILURES
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.newton import refine, spread
 from nldyn.orbits.orbit import Orbit, minimal_period, same_orbit
@@ -32,7 +32,7 @@ def deflated_orbit(
     problem = shooting_problem(flow, period)
     try:
         point = np.append(spread(problem, start, omega).ravel(), math.log(omega))
-    except ConvergenceError:
+    except FAILURES:
         return None
     row = np.zeros(point.size)
     row[-1] = 1.0
@@ -52,7 +52,7 @@ def deflated_orbit(
         return None
     try:
         orbit = refine(problem, problem.nodes(point), omega, observe, GUESS_ITERATIONS)
-    except ConvergenceError:
+    except FAILURES:
         return None
     if minimal_period(orbit) < period or any(same_orbit(orbit, other) for other in known):
         return None

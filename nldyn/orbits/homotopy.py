@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import krogh_interpolate
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, SystemModelError
+from nldyn.base.errors import FAILURES
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.newton import check_bounded, first_orbit, guessed_nodes
 from nldyn.orbits.orbit import Orbit
@@ -89,7 +89,7 @@ class Homotopy:
             problem = shooting_problem(flow, orbit.period, segments)
             nodes = guessed_nodes(problem, guess[:-1].reshape(segments, -1), omega)
             return first_orbit(problem, [nodes], omega, orbit.observe)
-        except (ConvergenceError, SystemModelError):
+        except FAILURES:
             return None
 
 

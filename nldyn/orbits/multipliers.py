@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgebal
 
 from nldyn.base.arrays import Real
+from nldyn.base.errors import ComputationError
 from nldyn.orbits.periodic_schur import product_eigenvalues
 
 EPS = float(np.finfo(float).eps)
@@ -21,7 +22,7 @@ FINE = 1e-4  # and the pieces should squeeze no more than so
 MOST_PARTS = 64
 
 
-class MultiplierError(RuntimeError):
+class MultiplierError(ComputationError):
     """The eigenvalues of a product could not be computed."""
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import (
+    FAILURES,
     ConvergenceError,
-    SystemModelError,
     check_frequency,
     check_positive,
     check_types,
@@ -196,7 +196,7 @@ def _by_more_damping(
         try:
             more = replace(problem, flow=way.flow(1.0))
             orbit = first_orbit(more, _simulated(more, omega, pieces, limit), omega, observe)
-        except (ConvergenceError, SystemModelError):
+        except FAILURES:
             continue
         found = way.carried(orbit, 1.0, 0.0, lambda: limit.look("a way back from more damping"))
         if found is not None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, check_frequency, check_whole
+from nldyn.base.errors import FAILURES, ConvergenceError, check_frequency, check_whole
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.flow.rigid import before_rigid_stops
 from nldyn.orbits.newton import check_bounded, refine, spread
@@ -192,7 +192,7 @@ def orbit_near(flow: FlowMap, start: Real, period: int, omega: float, observe: s
             problem = shooting_problem(flow, shorter)
             nodes = spread(problem, stroboscopic(orbit)[0], omega)
             orbit = refine(problem, nodes, omega, observe, GUESS_ITERATIONS)
-    except ConvergenceError:
+    except FAILURES:
         return None
     return orbit
 
@@ -204,7 +204,10 @@ def orbit_beside(
 
     See `nearest_orbit`.
     """
-    nodes = spread(shooting_problem(flow, period), start, omega)
+    try:
+        nodes = spread(shooting_problem(flow, period), start, omega)
+    except FAILURES:
+        return None
     nodes = nodes.reshape(period, SEGMENTS_PER_PERIOD, -1)
     return nearest_orbit(flow, nodes, omega, observe, SHORT_STEPS)
 
@@ -245,7 +248,7 @@ def nearest_orbit(
         if not found.converged:
             return None
         orbit = Orbit.of(problem, found, observe)
-    except ConvergenceError:
+    except FAILURES:
         return None
     shorter = minimal_period(orbit)
     if shorter == orbit.period:
@@ -288,7 +291,7 @@ def _refined(problem: ShootingProblem, start: Real, omega: float, observe: str) 
     """Orbit that Newton's method finds from a state at phase zero, if it finds one soon."""
     try:
         return refine(problem, spread(problem, start, omega), omega, observe, GUESS_ITERATIONS)
-    except ConvergenceError:
+    except FAILURES:
         return None
 
 

@@ -228,9 +228,8 @@ class ForcedResponse:
         """Why no motion without contact is bounded at ω (rad/s), and what helps, if none is."""
         terms = self.terms
         driven = np.any(self.amplitudes[1:], axis=1)
-        swings = (terms.kinds == GROWTH) & at_resonance(terms.rates, terms.orders * omega)
-        if np.any(driven & swings):
-            hz = terms.orders[driven & swings][0] * omega / (2.0 * np.pi)
+        hz = self.resonance_hz(omega, _ROUNDED)
+        if hz is not None:
             return (
                 f"the excitation at {hz:g} Hz meets an undamped mode exactly",
                 "give the mode some damping or move the frequency",
@@ -243,6 +242,14 @@ class ForcedResponse:
                 "hold the body by a spring or a stop",
             )
         return None
+
+    def resonance_hz(self, omega: float, within: float) -> float | None:
+        """Frequency in Hz of an undamped mode that a harmonic drives, within a share of ω."""
+        terms = self.terms
+        off = terms.rates - 1j * terms.orders * omega
+        met = (np.abs(off.real) < _ROUNDED * omega) & (np.abs(off.imag) < within * omega)
+        met &= (terms.kinds == GROWTH) & np.any(self.amplitudes[1:], axis=1)
+        return float(terms.rates[met][0].imag / (2.0 * np.pi)) if np.any(met) else None
 
     def harmonics(self, omega: float) -> tuple[Real, Complex]:
         """Orders m (k,) and amplitudes a (k, 2n) of the steady response z = Σ Re(a e^{imωt}).
