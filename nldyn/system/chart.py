@@ -225,7 +225,10 @@ def _polynomial(system: System, index: int) -> PolynomialSpring:
 
 
 def _replaced(elements: tuple[Any, ...], index: int, name: str, value: object) -> tuple[Any, ...]:
-    changed = replace(elements[index], **{name: value})
+    values: dict[str, object] = {name: value}
+    if name == "dashpot" and value == 0.0:
+        values["pulls"] = True  # without a dashpot no stop pulls, and none is said not to
+    changed = replace(elements[index], **values)
     return (*elements[:index], changed, *elements[index + 1 :])
 
 
