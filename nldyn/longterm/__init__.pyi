@@ -2,6 +2,7 @@
 
 from nldyn.longterm.attractors import Attractor as Attractor
 from nldyn.longterm.attractors import AttractorOptions as AttractorOptions
+from nldyn.longterm.attractors import Attractors as Attractors
 from nldyn.longterm.basins import Basins as Basins
 from nldyn.longterm.lifetimes import chaos_lifetime as chaos_lifetime
 from nldyn.longterm.manifolds import basin_edge as basin_edge

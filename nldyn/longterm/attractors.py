@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from functools import partial
@@ -19,7 +19,9 @@ from nldyn.base.errors import (
     check_frequency,
     check_types,
     check_whole,
+    is_finite,
     numbers,
+    shown,
 )
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.longterm.impacts import impacts
@@ -624,6 +626,48 @@ class Share:
     count: int
 
 
+class Attractors(list[Share]):
+    """The attractors that some initial states led to, with what these may have missed.
+
+    Parameters
+    ----------
+    shares : iterable of Share
+        The attractors.
+    drawn : int
+        How many of the initial states were drawn at random, each by itself.
+
+    Examples
+    --------
+    >>> print(f"{Attractors([], drawn=19).missed_share():.3f}")
+    0.146
+    """
+
+    def __init__(self, shares: Iterable[Share], drawn: int) -> None:
+        super().__init__(shares)
+        self.drawn = drawn
+
+    def missed_share(self, confidence: float = 0.95) -> float:
+        """Share of such initial states that an attractor which none of them met draws at most.
+
+        One that draws the share p is missed by n states with the probability (1 - p)ⁿ. So
+        p = 1 - (1 - confidence)^(1/n), about 3/n at 95 %: the upper limit of Clopper and Pearson
+        (1934, *Biometrika* 26, 404-413) for nothing seen.
+        """
+        if not (is_finite(confidence) and 0.0 < confidence < 1.0):
+            raise SystemModelError(f"confidence must lie between 0 and 1, got {shown(confidence)}")
+        return 1.0 - (1.0 - confidence) ** (1.0 / self.drawn) if self.drawn else 1.0
+
+    def __repr__(self) -> str:
+        """How many there are, and what share of initial states may lead to others."""
+        starts, most = sum(share.count for share in self), 100.0 * self.missed_share()
+        many = f"{len(self)} attractor{'' if len(self) == 1 else 's'}"
+        names = ", ".join(f"{share.attractor.name}: {share.count}" for share in self)
+        return (
+            f"<{many} from {starts} starts ({names}); one that none of the {self.drawn} random "
+            f"starts met draws less than {most:.2g} % of such (95 % confidence)>"
+        )
+
+
 def find_attractors(
     system: System | FlowMap,
     frequency_hz: float,
@@ -634,7 +678,7 @@ def find_attractors(
     options: AttractorOptions | None = None,
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> list[Share]:
+) -> Attractors:
     """Different attractors at one frequency, from many initial states.
 
     Parameters
@@ -645,7 +689,7 @@ def find_attractors(
         Excitation frequency in Hz.
     starts : int or (k, 2n) array
         How many initial states (rest, then random ones up to ten times the linear response), or
-        modal displacements and velocities.
+        modal displacements and velocities, which count as drawn at random.
     seed : int
         Of the random states.
     observe, options
@@ -657,8 +701,9 @@ def find_attractors(
 
     Returns
     -------
-    list of Share
-        Periodic attractors are the same if their orbits are; others if they are of one kind and
+    Attractors
+        A list of `Share` that tells what these starts may have missed. Periodic attractors are
+        the same if their orbits are; others if they are of one kind and
         their stroboscopic states fill the same region.
 
     Raises
@@ -674,8 +719,9 @@ def find_attractors(
     >>> system = System.from_matrices([[2.48]], [[16877.0]], {"middle": [1.0]},
     ...     modal_damping=0.0142, stops=[Stop("middle", stiffness=5.17e9)],
     ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> [share.attractor.name for share in find_attractors(system, 25.3, starts=4)]
-    ['period 1']
+    >>> find_attractors(system, 25.3, starts=4)
+    <1 attractor from 4 starts (period 1: 4); one that none of the 3 random starts met draws less \
+than 63 % of such (95 % confidence)>
     """
     flow = flow_of(system)
     check_types(options=(options, AttractorOptions, None))
@@ -689,11 +735,13 @@ def find_attractors(
         states = np.array([starting_state(flow, np.asarray(start)) for start in starts])
         if not len(states):
             raise SystemModelError("starts must hold at least one initial state, got none")
+        drawn = len(states)
     else:
         check_whole("starts", starts, 1, MOST_STARTS)
         states = random_states(flow, omega, int(starts), seed)
+        drawn = len(states) - 1  # the first is rest
     task = partial(attractor_from, flow, frequency_hz, name, options or AttractorOptions())
-    return distinct(values_of(task, list(states), executor, progress))
+    return Attractors(distinct(values_of(task, list(states), executor, progress)), drawn)
 
 
 def distinct(attractors: Sequence[Attractor]) -> list[Share]:

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 Given = TypeVar("Given")
 AnyComponent = fem.Component | fem.StructureComponent | cms.Matrices
 logger = logging.getLogger("nldyn")
+ALIKE_RIDE = 1e-6  # relative difference of two motions with the base that is rounding
 LARGE = 20000  # degrees of freedom from which on the factorisation takes seconds
 
 
@@ -348,17 +349,47 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
     '13.1293'
     """
     system = _relative_system(scene, reduced)
+    _check_rides(scene, system)
     if scene.observe is None or not scene.observe.absolute:
         return system
     with told_as(scene, ("observe", "absolute"), SystemModelError):
-        return system.with_absolute(scene.observe.at, _carried(scene, system))
+        return system.with_absolute(scene.observe.at, _carried(scene, system, scene.observe.at))
 
 
-def _carried(scene: Scene, system: System) -> dict[str, float]:
-    """How far the observed interface goes with each moving base, by its load vector."""
-    part, at, of = scene, scene.observed, ""
+def _check_rides(scene: Scene, system: System) -> None:
+    """Refuse stops, springs and dampers of which a moving base carries one end and not the other.
+
+    Displacements are relative to the base, so that their difference is not the distance.
+    """
+    bases = [source for source in system.excitation if isinstance(source, BaseMotion)]
+    if not bases or scene.modal is not None:  # where only the modes are known, these rides are not
+        return
+    for table in ("stops", "springs", "dampers"):
+        for number, element in enumerate(getattr(scene, table)):
+            if element.against is None:
+                continue
+            ends = (element.at, element.against)
+            carried = [_carried(scene, system, end) for end in ends]
+            apart: dict[tuple[int, int], complex] = {}
+            for source in bases:
+                factors = [factor.get(source.at, 0.0) for factor in carried]
+                kind = source.harmonic, source.power
+                apart[kind] = apart.get(kind, 0.0) + source.phasor * (factors[0] - factors[1])
+            most = max(abs(source.phasor) for source in bases)
+            if max(map(abs, apart.values())) > ALIKE_RIDE * most:
+                raise scene_error(
+                    scene.file, (table, number),
+                    f"a base carries '{ends[0]}' otherwise than '{ends[1]}', but displacements "
+                    "are relative to the base: move both by it, or give forces in place of it",
+                    sep=": ",
+                )  # fmt: skip
+
+
+def _carried(scene: Scene, system: System, interface: str) -> dict[str, float]:
+    """How far an interface goes with each moving base, by its load vector."""
+    part, at, of = scene, interface, ""
     if scene.components:
-        name, at = place(scene.observed)
+        name, at = place(interface)
         part, of = scene.component_scenes[name], f"{name}."
     bases = {source.at for source in system.excitation if isinstance(source, BaseMotion)}
     loads = [base.removeprefix(of) for base in sorted(bases) if base.startswith(of)]

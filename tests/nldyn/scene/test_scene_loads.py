@@ -237,3 +237,34 @@ def test_a_body_that_nothing_holds_ends_with_the_reason():
     between = parse_scene(held.replace("range_hz = [0.05, 0.2]", once) + shaken)
     notes = compute(between).notes
     assert any("where the motion touches no stop, nothing" in note for note in notes)
+
+
+RIDES = """
+[matrices]
+mass = [[1.0, 0.0], [0.0, 1.0]]
+stiffness = [[394784.0, 0.0], [0.0, 394784.0]]
+interfaces.a = [1.0, 0.0]
+interfaces.b = [0.0, 1.0]
+loads.A = {load}
+[damping]
+modal_ratio = 0.02
+{element}
+[[excitation]]
+at = "A"
+kind = "base"
+amplitude = 1e-3
+"""
+TIES = {
+    "stops": '[[stops]]\nat = "a"\nagainst = "b"\nlaw = "linear"\nstiffness = 1e6\ngap = 5e-4',
+    "springs": '[[springs]]\nat = "a"\nagainst = "b"\nstiffness = 10.0',
+    "dampers": '[[dampers]]\nat = "a"\nagainst = "b"\ncoefficient = 1.0',
+}
+
+
+@pytest.mark.parametrize("table", TIES)
+def test_what_ties_a_place_that_rides_to_one_that_does_not_is_refused(table):
+    """Displacements are relative to the base: a base that moves both ends is no matter."""
+    with pytest.raises(SceneError, match=rf"{table}\[0\]: a base carries 'a' otherwise than 'b'"):
+        build_system(parse_scene(RIDES.format(load=[1.0, 0.0], element=TIES[table])))
+    build_system(parse_scene(RIDES.format(load=[1.0, 1.0], element=TIES[table])))
+    build_system(parse_scene(RIDES.format(load=[1.0, 0.0], element="")))
