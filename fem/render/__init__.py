@@ -2,9 +2,10 @@
 
 from fem.render.frame_scenery import StopSphere
 from fem.render.gl import RenderError, gl_available
-from fem.render.page import write_page
-from fem.render.pictures import VIEWS, animate, render_comparison, render_modes, render_shape
+from fem.render.page import write_motion, write_page
+from fem.render.pictures import animate, render_comparison, render_modes, render_shape
 from fem.render.several import Several
+from fem.render.views import VIEWS
 
 __all__ = [
     "VIEWS",
@@ -16,5 +17,6 @@ __all__ = [
     "render_comparison",
     "render_modes",
     "render_shape",
+    "write_motion",
     "write_page",
 ]

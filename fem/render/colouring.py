@@ -67,6 +67,19 @@ def surface_values(
     return np.concatenate([nodal, *_beam_values(drawing, u, colour)])
 
 
+def colour_name(drawing: FrameSurface | StructureSurface | SeveralSurfaces, colour: str) -> str:
+    """What the bar of colours says of a quantity, without its unit."""
+    if colour != "stress":
+        return "bending moment" if colour == "moment" else colour
+    parts = drawing.parts.values() if isinstance(drawing, SeveralSurfaces) else [drawing]
+    names = []
+    if any(isinstance(part, StructureSurface) and len(part.nodes) for part in parts):
+        names.append("von Mises stress, averaged over cells")
+    if any(isinstance(part, FrameSurface) or part.beams for part in parts):
+        names.append("stress of the outermost fibre of beams")
+    return "; ".join(names)
+
+
 def von_mises(component: StructureComponent, u: FloatArray) -> FloatArray:
     """Von Mises' stress in Pa at every node, the mean over the cells that meet there, (n,).
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +30,7 @@ class StopSphere:
     point
         The point of the mesh that hits it.
     radius
-        In m.
+        In m; unless given it is drawn with a hundredth of the structure's size.
     direction
         From the beam to the stop, (x, y) or in a structure (x, y, z): the way the point moves to
         hit it.
@@ -49,12 +49,12 @@ class StopSphere:
     """
 
     point: str
-    radius: float
+    radius: float | None = None
     direction: tuple[float, ...] = (0.0, 1.0)
     gap: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.radius) and self.radius > 0.0):
+        if self.radius is not None and not (math.isfinite(self.radius) and self.radius > 0.0):
             raise ModelError(f"stop at {self.point!r}: radius must be positive, not {self.radius}")
         if not math.isfinite(self.gap):
             raise ModelError(f"stop at {self.point!r}: gap must be finite, not {self.gap}")
@@ -178,8 +178,8 @@ def cone(tip: FloatArray, axis: FloatArray, height: float) -> Any:
     )
 
 
-def mass_blocks(drawing: FrameSurface, stop: StopSphere | None) -> list[Block]:
-    """A cube of steel for each point mass, beside the beam and away from the stop.
+def mass_blocks(drawing: FrameSurface, stops: Sequence[StopSphere]) -> list[Block]:
+    """A cube of steel for each point mass, beside the beam and away from a stop.
 
     At the plane of symmetry of a half model it is half of the cube that the whole model has.
     Blocks at the image of a mirrored frame do not move with it and are left out.
@@ -189,15 +189,16 @@ def mass_blocks(drawing: FrameSurface, stop: StopSphere | None) -> list[Block]:
     for lump in drawing.component.model.point_masses:
         if lump.mass > 0.0:
             node = mesh.node(lump.point)
-            solid = mass_block(drawing, lump, side_for_mass(drawing.component, node, stop))
+            solid = mass_block(drawing, lump, side_for_mass(drawing.component, node, stops))
             at_rest = np.array(solid.points, dtype=np.float64)
             blocks.append(Block(node, mesh.points[node, :2], at_rest, solid))
     return blocks
 
 
-def side_for_mass(component: Component, node: int, stop: StopSphere | None) -> FloatArray:
-    """Unit vector (2,) to where a mass is drawn: away from the stop, or below the beam."""
-    if stop is not None and component.model.mesh.node(stop.point) == node:
+def side_for_mass(component: Component, node: int, stops: Sequence[StopSphere]) -> FloatArray:
+    """Unit vector (2,) to where a mass is drawn: away from a stop, or below the beam."""
+    stop = next((each for each in stops if component.model.mesh.node(each.point) == node), None)
+    if stop is not None:
         return -np.array(stop.direction) / math.hypot(*stop.direction)
     outward = ends_at(component, node)[0]
     below = np.array([outward[1], -outward[0]])
@@ -225,15 +226,20 @@ def sphere_on_post(centre: FloatArray, axis: FloatArray, radius: float, post: fl
     import pyvista
 
     return [
-        pyvista.Sphere(radius=radius, center=centre, theta_resolution=48, phi_resolution=48),
+        pyvista.Sphere(radius=radius, center=centre, theta_resolution=32, phi_resolution=32),
         pyvista.Cylinder(
             center=centre + post / 2 * axis,
             direction=axis,
             radius=0.55 * radius,
             height=post,
-            resolution=48,
+            resolution=32,
         ),
     ]
+
+
+def drawn_radius(mark: float) -> float:
+    """Radius of a stop that has none, beside marks of a size, in m."""
+    return 0.5 * mark
 
 
 def stop_solids(drawing: FrameSurface, stop: StopSphere, scale: float) -> list[Any]:
@@ -244,11 +250,13 @@ def stop_solids(drawing: FrameSurface, stop: StopSphere, scale: float) -> list[A
     towards = np.array(stop.direction) / math.hypot(*stop.direction)
     surface = reach(component, node, towards)[0] + scale * stop.gap
     axis = np.append(towards, 0.0)
-    centre = mesh.points[node] + (surface + stop.radius) * axis
-    post = max(1.6 * mark_size(component), 4.0 * stop.radius)
-    width = max(1.1 * mark_size(component), 3.0 * stop.radius)
+    mark = mark_size(component)
+    radius = stop.radius or drawn_radius(mark)
+    centre = mesh.points[node] + (surface + radius) * axis
+    post = max(1.6 * mark, 4.0 * radius)
+    width = max(1.1 * mark, 3.0 * radius)
     return [
-        *sphere_on_post(centre, axis, stop.radius, post),
+        *sphere_on_post(centre, axis, radius, post),
         oriented_box(
             centre + (post + 0.15 * width) * axis, towards, (0.3 * width, 2 * width, width)
         ),

@@ -24,13 +24,14 @@ from fem.assembly.structure import StructureComponent
 from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError
 from fem.base.files import draft_of
-from fem.render.colouring import surface_values
+from fem.render.colouring import colour_name, surface_values
 from fem.render.frame_scenery import Block, StopSphere, mass_blocks, stop_solids, support_solids
 from fem.render.frame_surface import FrameSurface, frame_surface
 from fem.render.gl import RenderError, on_screen, require_gl
-from fem.render.several import OfPart, Several, SeveralSurfaces, stop_at
+from fem.render.several import OfPart, Several, SeveralSurfaces, stops_at
 from fem.render.structure_scenery import Cube, mass_cubes, stop_bodies, support_marks
 from fem.render.structure_surface import StructureSurface, structure_surface, without_mirror
+from fem.render.views import MOTION, axes_of_view
 
 if TYPE_CHECKING:
     import pyvista
@@ -47,20 +48,14 @@ GHOST = "#6b7785"
 STEEL = "#55606e"
 STOP = "#c0392b"
 COLOURS = "viridis"
+SIGNED_COLOURS = "coolwarm"
+SMALL = 1e-4  # of the structure's size: so little it moves where its moves are taken as linear
 BLOCK = "#8a8f98"
 PLANE = "#3a78b5"
 AUTO_FRACTION = 0.06
 BAR_ROW = 110
 GHOST_SHRINKAGE = 0.97
 """Makes the frame at rest a little thinner, so that it hides inside the other where they agree."""
-VIEWS = {
-    "oblique": (0.20, 0.42, 1.0),
-    "front": (0.0, 0.0, 1.0),
-    "top": (0.0, 1.0, 0.0),
-    "side": (1.0, 0.0, 0.0),
-    "isometric": (1.0, 1.0, 1.0),
-}
-"""From where the frame is looked at: y is up, but from the top x is to the right."""
 TRIAD = 110  # pixels
 FIELD = (0.20, 0.85, 0.94)
 SHEET_FIELD = (0.05, 0.84, 0.94)
@@ -75,7 +70,7 @@ def render_shape(
     *,
     title: str = ...,
     scale: float | None = ...,
-    stop: StopSphere | None = ...,
+    stops: Sequence[StopSphere] = ...,
     mirror: str | None = ...,
     colour: str = ...,
     view: str = ...,
@@ -89,7 +84,7 @@ def render_shape(
     *,
     title: str = ...,
     scale: float | None = ...,
-    stop: StopSphere | None = ...,
+    stops: Sequence[StopSphere] = ...,
     mirror: str | None = ...,
     colour: str = ...,
     view: str = ...,
@@ -102,17 +97,17 @@ def render_shape(
     *,
     title: str = "",
     scale: float | None = None,
-    stop: StopSphere | None = None,
+    stops: Sequence[StopSphere] = (),
     mirror: str | None = None,
     colour: str = "displacement",
-    view: str = "oblique",
+    view: str = MOTION,
     size: tuple[int, int] = (1600, 900),
 ) -> pyvista.Plotter | float:
     """Picture of a deflected frame or structure, coloured by its displacement or stress.
 
     Drawn with it: the same at rest in grey, supports, point masses as blocks of steel of that
-    mass, and the stop at its true place (its gap scaled as the deflection is). The factor on the
-    deflection is stated in the picture.
+    mass, and the stops at their true places (their gaps scaled as the deflection is). The factor
+    on the deflection is stated in the picture.
 
     Parameters
     ----------
@@ -126,15 +121,16 @@ def render_shape(
         Text above the picture.
     scale
         Factor on the deflection; by default a round one that makes it well visible.
-    stop
-        The stop to draw.
+    stops
+        The stops to draw.
     mirror
         A point on a plane of symmetry, to draw half a frame whole.
     colour
         "displacement"; "stress": von Mises' in solids, that of the outermost fibre in beams; or
         "moment": the bending moment of beams.
     view
-        From where: one of `VIEWS`. Axes in a corner show the directions.
+        From where: one of `VIEWS`, or "motion", from where what moves is seen best. Axes in a
+        corner show the directions.
     size
         Width and height in pixels.
 
@@ -171,8 +167,8 @@ def render_shape(
     require_gl()
     with picture(target, size) as plotter:
         moving = add_deflected(plotter, drawing, states[0], factor, colour)
-        compose(plotter, moving, states, stop, title, size, checked_view(view))
-        add_note(plotter, scale_note(factor, stop), size)
+        compose(plotter, moving, states, stops, title, size, view)
+        add_note(plotter, scale_note(factor, stops), size)
     return plotter if target is None else factor
 
 
@@ -184,6 +180,7 @@ def render_modes(
     path: None = None,
     *,
     mirror: str | None = ...,
+    stops: Sequence[StopSphere] = ...,
     view: str = ...,
     size: tuple[int, int] | None = ...,
 ) -> pyvista.Plotter: ...
@@ -195,6 +192,7 @@ def render_modes(
     path: str | os.PathLike[str],
     *,
     mirror: str | None = ...,
+    stops: Sequence[StopSphere] = ...,
     view: str = ...,
     size: tuple[int, int] | None = ...,
 ) -> None: ...
@@ -205,10 +203,13 @@ def render_modes(
     path: str | os.PathLike[str] | None = None,
     *,
     mirror: str | None = None,
-    view: str = "oblique",
+    stops: Sequence[StopSphere] = (),
+    view: str = MOTION,
     size: tuple[int, int] | None = None,
 ) -> pyvista.Plotter | None:
     """Picture with one mode in each field, all drawn with the same largest displacement.
+
+    The colours are the displacement along the axis along which a mode moves most.
 
     Parameters
     ----------
@@ -222,8 +223,10 @@ def render_modes(
         The .png to write, whole or not at all; without it the plotter is returned.
     mirror
         A point on a plane of symmetry, to draw a half model whole.
+    stops
+        The stops to draw, off by their gaps as they are.
     view
-        From where, as for `render_shape`.
+        From where, as for `render_shape`; that of "motion" may differ from mode to mode.
     size
         Width and height in pixels; by default what k fields need.
 
@@ -262,11 +265,11 @@ def render_modes(
     with picture(target, window, (rows, columns), BAR_ROW / field[1]) as plotter:
         for index, (mode, title) in enumerate(zip(modes, titles, strict=True)):
             plotter.subplot(*divmod(index, columns))
-            moving = add_mode(plotter, drawing, mode, title, field, checked_view(view))
+            moving = add_mode(plotter, drawing, mode, title, field, view, stops)
         plotter.subplot(rows, 0)
         drawn = f"{moving.factor * 1e3:.3g} mm"
-        label = f"displacement relative to each mode's largest, which is drawn as {drawn}"
-        add_scalar_bar(plotter, moving, label, window[0], BAR_ROW)
+        label = f"displacement along the axis named, relative to the largest, drawn as {drawn}"
+        add_scalar_bar(plotter, moving, label, window[0], BAR_ROW, 4)
     return plotter if target is None else None
 
 
@@ -343,11 +346,11 @@ def render_comparison(
         other, _ = drawing.place(states[1], factor)
         _, lines = polydata(drawing, other)
         plotter.add_mesh(lines, color=STOP, line_width=3.0)
-        compose(plotter, moving, states, None, title, size, checked_view("oblique"))
+        compose(plotter, moving, states, (), title, size, MOTION)
         unit, per_metre = length_unit(float(apart.max()))
-        moving.colour_by(per_metre, float(apart.max()))
         moving.surface.point_data["colour"][:] = apart * per_metre
-        add_scalar_bar(plotter, moving, f"distance between the two in {unit}", *size)
+        parts = moving.range_of(0.0, float(apart.max()) * per_metre)
+        add_scalar_bar(plotter, moving, f"distance between the two, {unit}", *size, parts)
         note = f"deflection drawn × {factor:g};  red lines: reduced model, off by {share:.2g}"
         add_note(plotter, note + " of the largest displacement", size)
     return plotter if target is None else share
@@ -360,11 +363,11 @@ def animate(
     *,
     times: npt.ArrayLike,
     scale: float | None = None,
-    stop: StopSphere | None = None,
+    stops: Sequence[StopSphere] = (),
     mirror: str | None = None,
     colour: str = "displacement",
     title: str = "",
-    view: str = "oblique",
+    view: str = MOTION,
     fps: float = 25.0,
     size: tuple[int, int] = (1120, 540),
 ) -> float:
@@ -381,7 +384,7 @@ def animate(
         A .gif, or an .mp4 where imageio-ffmpeg is installed; written whole or not at all.
     times
         Instants in s, shape (m,), shown in the pictures.
-    scale, stop, mirror, colour, title, view
+    scale, stops, mirror, colour, title, view
         As for `render_shape`; one scale and one range of colours for all pictures.
     fps
         Pictures per second.
@@ -416,11 +419,7 @@ def animate(
     target = named(path, (".gif", ".mp4"))
     drawing = surface_of(component, mirror)
     states = checked_states(component, displacements, 2)
-    instants = np.asarray(times, dtype=np.float64)
-    if instants.shape != (len(states),):
-        raise ModelError(
-            f"there are {len(states)} states to draw, but times has shape {instants.shape}"
-        )
+    instants = checked_times(times, len(states))
     if not (math.isfinite(fps) and fps > 0.0):
         raise ModelError(f"fps must be positive, not {fps}")
     factor = automatic_scale(drawing, states) if scale is None else checked_scale(scale)
@@ -428,11 +427,11 @@ def animate(
     require_gl()
     with contextlib.closing(plotter_of(size, True)) as plotter:
         moving = add_deflected(plotter, drawing, states[0], factor, colour)
-        compose(plotter, moving, states, stop, title, size, checked_view(view))
+        compose(plotter, moving, states, stops, title, size, view)
         images = []
         for state, instant in zip(states, instants, strict=True):
             moving.move(state)
-            add_note(plotter, f"t = {instant * 1e3:.2f} ms;  {scale_note(factor, stop)}", size)
+            add_note(plotter, f"t = {instant * 1e3:.2f} ms;  {scale_note(factor, stops)}", size)
             plotter.render()
             images.append(plotter.screenshot(None, return_img=True))
     write_video(target, images, fps)
@@ -465,6 +464,14 @@ def checked_states(component: AnyComponent, states: npt.ArrayLike, dimensions: i
     if not np.all(np.isfinite(array)):
         raise ModelError(f"{source}: displacements to draw are not all finite numbers")
     return array.reshape(-1, count)
+
+
+def checked_times(times: npt.ArrayLike, count: int) -> FloatArray:
+    """The instants as (m,) floats, or ModelError where there is not one for each state."""
+    instants = np.asarray(times, dtype=np.float64)
+    if instants.shape != (count,):
+        raise ModelError(f"there are {count} states to draw, but times has shape {instants.shape}")
+    return instants
 
 
 def checked_scale(scale: float) -> float:
@@ -512,24 +519,36 @@ def round_number(value: float) -> float:
 
 
 def quantity_unit(colour: str, largest: float) -> tuple[str, float]:
-    """What the bar of colours says, and the factor on the quantity.
+    """The unit of the bar of colours, and the factor on the quantity.
 
     Examples
     --------
     >>> quantity_unit("stress", 2.3e8)
-    ('stress in MPa', 1e-06)
+    ('MPa', 1e-06)
     """
     if colour == "displacement":
-        unit, factor = length_unit(largest)
-    elif colour == "stress":
-        unit, factor = next(
-            (u, f)
-            for u, f in (("MPa", 1e-6), ("kPa", 1e-3), ("Pa", 1.0))
-            if largest * f >= 0.1 or f == 1.0
-        )
-    else:
-        unit, factor = "N m", 1.0
-    return f"{'bending moment' if colour == 'moment' else colour} in {unit}", factor
+        return length_unit(largest)
+    if colour == "stress":
+        units = (("MPa", 1e-6), ("kPa", 1e-3), ("Pa", 1.0))
+        return next((u, f) for u, f in units if largest * f >= 0.1 or f == 1.0)
+    return "N m", 1.0
+
+
+def round_range(largest: float) -> tuple[float, int]:
+    """The end of a bar of colours that reaches up to a value, and the parts its ticks cut it into.
+
+    Examples
+    --------
+    >>> round_range(5.05), round_range(1.54e-3), round_range(0.0)
+    ((6.0, 3), (0.002, 4), (1.0, 5))
+    """
+    if largest <= 0.0:
+        return 1.0, 5
+    power = 10.0 ** math.floor(math.log10(largest))
+    for lead, parts in ((1, 5), (1.5, 3), (2, 4), (2.5, 5), (3, 3), (4, 4), (5, 5), (6, 3), (8, 4)):
+        if largest <= lead * power * (1 + 1e-9):
+            return float(f"{lead * power:.3g}"), parts
+    return float(f"{10 * power:.3g}"), 5
 
 
 def length_unit(largest: float) -> tuple[str, float]:
@@ -540,9 +559,10 @@ def length_unit(largest: float) -> tuple[str, float]:
     return ("nm", 1e9) if largest > 0.0 else ("mm", 1e3)
 
 
-def scale_note(factor: float, stop: StopSphere | None) -> str:
+def scale_note(factor: float, stops: Sequence[StopSphere]) -> str:
     """What the picture says about its scale."""
-    return f"deflection drawn × {factor:g};  grey: at rest" + (";  red: stop" if stop else "")
+    red = f";  red: stop{'s' if len(stops) > 1 else ''}" if stops else ""
+    return f"deflection drawn × {factor:g};  grey: at rest{red}"
 
 
 # What is drawn
@@ -575,11 +595,20 @@ class Moving:
         for block in self.blocks:
             block.move(shape, self.factor)
 
-    def colour_by(self, factor: float, largest: float) -> None:
-        """Set the factor on the colours and their range, 0 to ``largest`` in SI units."""
+    def colour_by(self, factor: float, largest: float) -> int:
+        """Set the factor on the colours and their range, 0 to about ``largest`` in SI units.
+
+        How many parts the ticks of the bar cut it into is returned.
+        """
         self.surface.point_data["colour"][:] *= factor / self.factor_on_colour
         self.factor_on_colour = factor
-        self.actor.mapper.scalar_range = (0.0, largest * factor or 1.0)
+        return self.range_of(0.0, largest * factor)
+
+    def range_of(self, low: float, high: float) -> int:
+        """Set the range of the colours, up to a round number; the parts that ticks cut it into."""
+        top, parts = round_range(high)
+        self.actor.mapper.scalar_range = (low, top)
+        return parts
 
 
 @contextlib.contextmanager
@@ -670,6 +699,7 @@ def add_deflected(
     u: FloatArray,
     factor: float,
     colour: str = "displacement",
+    cmap: str = COLOURS,
 ) -> Moving:
     """Draw the deflected frame and, in grey, the frame at rest."""
     rest, _ = drawing.place(np.zeros_like(u), shrinkage=GHOST_SHRINKAGE)
@@ -683,7 +713,7 @@ def add_deflected(
     actor = plotter.add_mesh(
         surface,
         scalars="colour",
-        cmap=COLOURS,
+        cmap=cmap,
         show_scalar_bar=False,
         ambient=0.35,
         diffuse=0.75,
@@ -699,22 +729,25 @@ def compose(
     plotter: Plotter,
     moving: Moving,
     states: FloatArray,
-    stop: StopSphere | None,
+    stops: Sequence[StopSphere],
     title: str,
     size: tuple[int, int],
-    view: FloatArray,
+    view: str,
 ) -> None:
     """Put everything around the deflected frame, with one range of colours for all states."""
     drawing = moving.drawing
-    moving.blocks = add_surroundings(plotter, drawing, moving.factor, stop)
+    moving.blocks = add_surroundings(plotter, drawing, moving.factor, stops)
     keep_room(plotter, drawing, states, moving.factor)
     largest = max(float(surface_values(drawing, u, moving.colour).max()) for u in states)
-    label, on_colour = quantity_unit(moving.colour, largest)
-    moving.colour_by(on_colour, largest)
+    unit, on_colour = quantity_unit(moving.colour, largest)
+    parts = moving.colour_by(on_colour, largest)
     moving.move(states[0])
-    add_scalar_bar(plotter, moving, label, *size)
+    label = f"{colour_name(drawing, moving.colour)}, {unit}"
+    add_scalar_bar(plotter, moving, label, *size, parts)
     add_text(plotter, title, "title", (0.5, 0.92), 1.4 * text_height(size[1]), size[0])
-    fit_camera(plotter, size, view)
+    rest, _ = drawing.place(np.zeros_like(states[0]))
+    most = max(states, key=lambda u: float(drawing.place(u)[1].max()))
+    fit_camera(plotter, size, axes_of_view(view, rest, drawing.place(most)[0] - rest))
     add_triad(plotter, size)
 
 
@@ -728,16 +761,16 @@ def add_surroundings(
     plotter: Plotter,
     drawing: Surface,
     factor: float,
-    stop: StopSphere | None,
+    stops: Sequence[StopSphere],
 ) -> list[Mass]:
-    """Draw supports, the stop and the masses; the masses are returned, because they move."""
-    marks, stops, blocks = surroundings(drawing, factor, stop)
+    """Draw supports, the stops and the masses; the masses are returned, because they move."""
+    marks, bodies, blocks = surroundings(drawing, factor, stops)
     for solid, plane in marks:
         if plane:
             plotter.add_mesh(solid, color=PLANE, opacity=0.25, lighting=False)
         else:
             add_solid(plotter, solid, STEEL)
-    for solid in stops:
+    for solid in bodies:
         add_solid(plotter, solid, STOP, smooth=solid.n_cells > 100)
     for block in blocks:
         add_solid(plotter, block.solid, BLOCK)
@@ -745,15 +778,15 @@ def add_surroundings(
 
 
 def surroundings(
-    drawing: Surface, factor: float, stop: StopSphere | None
+    drawing: Surface, factor: float, stops: Sequence[StopSphere]
 ) -> tuple[list[tuple[Any, bool]], list[Any], list[Mass]]:
-    """Marks of the supports, bodies of the stop, and the masses."""
+    """Marks of the supports, bodies of the stops with ``factor`` times the gap, and the masses."""
     if not isinstance(drawing, SeveralSurfaces):
-        marks, bodies, masses = part_surroundings(drawing, factor, stop)
+        marks, bodies, masses = part_surroundings(drawing, factor, stops)
         return marks, bodies, [*masses]
     found: tuple[list[tuple[Any, bool]], list[Any], list[Mass]] = [], [], []
     for name, part in drawing.parts.items():
-        marks, bodies, masses = part_surroundings(part, factor, stop_at(name, stop))
+        marks, bodies, masses = part_surroundings(part, factor, stops_at(name, stops))
         found[0].extend(marks)
         found[1].extend(bodies)
         found[2].extend(OfPart(name, mass) for mass in masses)
@@ -761,14 +794,14 @@ def surroundings(
 
 
 def part_surroundings(
-    drawing: FrameSurface | StructureSurface, factor: float, stop: StopSphere | None
+    drawing: FrameSurface | StructureSurface, factor: float, stops: Sequence[StopSphere]
 ) -> tuple[list[tuple[Any, bool]], list[Any], list[Block | Cube]]:
     """The same of one component."""
     if isinstance(drawing, StructureSurface):
-        stops = [] if stop is None else stop_bodies(drawing, stop, factor)
-        return list(support_marks(drawing)), stops, [*mass_cubes(drawing, stop)]
-    stops = [] if stop is None else stop_solids(drawing, stop, factor)
-    return list(support_solids(drawing)), stops, [*mass_blocks(drawing, stop)]
+        bodies = [body for stop in stops for body in stop_bodies(drawing, stop, factor)]
+        return list(support_marks(drawing)), bodies, [*mass_cubes(drawing, stops)]
+    bodies = [body for stop in stops for body in stop_solids(drawing, stop, factor)]
+    return list(support_solids(drawing)), bodies, [*mass_blocks(drawing, stops)]
 
 
 def add_solid(plotter: Plotter, solid: Any, colour: str, smooth: bool = False) -> None:
@@ -793,13 +826,18 @@ def keep_room(plotter: Plotter, drawing: Surface, states: FloatArray, factor: fl
     plotter.add_mesh(pyvista.PolyData(np.array([low, high])), opacity=0.0, point_size=1.0)
 
 
-def add_scalar_bar(plotter: Plotter, moving: Moving, title: str, width: int, height: int) -> None:
-    """A horizontal bar of colours at the bottom of a field of this size, its title above it."""
+def add_scalar_bar(
+    plotter: Plotter, moving: Moving, title: str, width: int, height: int, parts: int
+) -> None:
+    """A horizontal bar of colours at the bottom of a field of this size, its title above it.
+
+    Its ticks cut it into so many parts.
+    """
     letters = 20.0 if height > 300 else 17.0
     plotter.add_scalar_bar(
         title=" ",
         mapper=moving.actor.mapper,
-        n_labels=5,
+        n_labels=parts + 1,
         fmt="%.3g",
         position_x=0.30,
         position_y=8.0 / height,
@@ -843,26 +881,16 @@ def add_triad(plotter: Plotter, size: tuple[int, int]) -> None:
     plotter.add_axes(line_width=2, color=TEXT, viewport=(0.0, 0.0, wide, high), interactive=False)
 
 
-def checked_view(view: str) -> FloatArray:
-    """The unit vector towards the eye, or ModelError."""
-    if view not in VIEWS:
-        raise ModelError(f"view must be one of {', '.join(VIEWS)}, not {view!r}")
-    towards = np.array(VIEWS[view])
-    return np.asarray(towards / np.linalg.norm(towards))
-
-
 def fit_camera(
     plotter: Plotter,
     size: tuple[int, int],
-    back: FloatArray,
+    axes: FloatArray,
     field: tuple[float, float, float] = FIELD,
 ) -> None:
-    """Look at the frame from a direction, without perspective, as large as fits."""
+    """Look at the frame along the last of three axes, without perspective, as large as fits."""
+    right, up, back = axes
     box = np.array(plotter.bounds).reshape(3, 2)
     corners = np.stack(np.meshgrid(*box, indexing="ij"), axis=-1).reshape(-1, 3)
-    right = np.cross([0.0, 1.0, 0.0], back)
-    right = right / np.linalg.norm(right) if right.any() else np.array([1.0, 0.0, 0.0])
-    up = np.cross(back, right)
     across, above = corners @ right, corners @ up
     half_width, half_height = np.ptp(across) / 2, np.ptp(above) / 2
     low, high, wide = field
@@ -883,20 +911,51 @@ def add_mode(
     mode: FloatArray,
     title: str,
     size: tuple[int, int],
-    view: FloatArray,
+    view: str,
+    stops: Sequence[StopSphere],
 ) -> Moving:
     """One field of the sheet of modes."""
+    rest, _ = drawing.place(np.zeros_like(mode))
     largest = float(drawing.place(mode)[1].max())
     unit = mode / largest if largest > 0.0 else mode
-    factor = AUTO_FRACTION * extent(drawing.place(np.zeros_like(mode))[0])
-    moving = add_deflected(plotter, drawing, unit, factor)
-    moving.blocks = add_surroundings(plotter, drawing, factor, None)
-    moving.colour_by(1.0, 1.0)
+    factor = AUTO_FRACTION * extent(rest)
+    moved = surface_moves(drawing, unit, rest)
+    values, axis = signed_values(moved)
+    moving = add_deflected(plotter, drawing, unit, factor, cmap=SIGNED_COLOURS)
+    moving.blocks = add_surroundings(plotter, drawing, 1.0, stops)
     moving.move(unit)
-    add_text(plotter, title, "title", (0.5, 0.89), 22.0, size[0])
-    fit_camera(plotter, size, view, SHEET_FIELD)
+    moving.surface.point_data["colour"][:] = values
+    moving.range_of(-1.0, 1.0)
+    add_text(plotter, f"{title}, along {axis}", "title", (0.5, 0.89), 22.0, size[0])
+    fit_camera(plotter, size, axes_of_view(view, rest, moved), SHEET_FIELD)
     add_triad(plotter, size)
     return moving
+
+
+def surface_moves(drawing: Surface, shape: FloatArray, rest: FloatArray) -> FloatArray:
+    """How far a small multiple of a shape moves the points (p, 3), for the whole shape.
+
+    Sections turn with the axis and are not stretched: so only small deflections are linear.
+    """
+    most = float(drawing.place(shape)[1].max(initial=0.0))
+    if most == 0.0:
+        return np.zeros_like(rest)
+    small = SMALL * extent(rest) / most
+    points, _ = drawing.place(shape, small)
+    return np.asarray((points - rest) / small)
+
+
+def signed_values(moved: FloatArray) -> tuple[FloatArray, str]:
+    """Displacements (p,) along the axis along which most moves, over the largest; and that axis.
+
+    Examples
+    --------
+    >>> signed_values(np.array([[0.0, 2.0, 0.1], [0.0, -4.0, 0.1]]))
+    (array([ 0.5, -1. ]), 'y')
+    """
+    axis = int(np.argmax(np.linalg.norm(moved, axis=0)))
+    along = moved[:, axis]
+    return along / (np.abs(along).max(initial=0.0) or 1.0), "xyz"[axis]
 
 
 def fields(count: int) -> tuple[int, int]:

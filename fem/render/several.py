@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -117,18 +117,20 @@ class SeveralSurfaces:
         return begun
 
 
-def stop_at(name: str, stop: StopSphere | None) -> StopSphere | None:
-    """The stop as its own component knows it, None for others.
+def stops_at(name: str, stops: Sequence[StopSphere]) -> list[StopSphere]:
+    """The stops of a component as it knows them, without those of others.
 
     Examples
     --------
-    >>> stop_at("arm", StopSphere("arm.tip", 0.01, (0.0, 1.0), 0.0)).point
-    'tip'
-    >>> stop_at("tool", StopSphere("arm.tip", 0.01, (0.0, 1.0), 0.0))
+    >>> stop = StopSphere("arm.tip", 0.01, (0.0, 1.0), 0.0)
+    >>> [each.point for each in stops_at("arm", [stop])], stops_at("tool", [stop])
+    (['tip'], [])
     """
-    if stop is None or not stop.point.startswith(f"{name}."):
-        return None
-    return replace(stop, point=stop.point.removeprefix(f"{name}."))
+    return [
+        replace(stop, point=stop.point.removeprefix(f"{name}."))
+        for stop in stops
+        if stop.point.startswith(f"{name}.")
+    ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,13 @@ import numpy as np
 
 from fem.base.arrays import FloatArray, IntArray
 from fem.mesh.cells import KINDS
-from fem.render.frame_scenery import BLOCK_DENSITY, MARK_FRACTION, StopSphere, sphere_on_post
+from fem.render.frame_scenery import (
+    BLOCK_DENSITY,
+    MARK_FRACTION,
+    StopSphere,
+    drawn_radius,
+    sphere_on_post,
+)
 from fem.render.structure_surface import StructureSurface
 
 LIFT = 1e-3
@@ -46,24 +52,36 @@ def size_of(drawing: StructureSurface) -> float:
 
 
 def support_marks(drawing: StructureSurface) -> Iterator[tuple[Any, bool]]:
-    """A patch on each held face, a cube at each held point; with each whether one axis is held."""
+    """A patch on each held face, cubes at other held nodes; with each whether one axis is held."""
     import pyvista
 
     model = drawing.component.model
     mark = MARK_FRACTION * size_of(drawing)
     for support in model.supports:
         translations = {"x", "y", "z"} & set(support.directions)
+        one_axis = len(translations) == 1
         facets = {} if model.is_plane else model.facets_on(support.point)
-        if facets:
-            for patch in _patches(drawing, facets):
-                yield patch, len(translations) == 1
-        elif len(translations) > 1 and len(model.mesh.nodes(support.point)) == 1:
-            for node in model.mesh.nodes(support.point):
-                centre = model.mesh.points[node]
-                yield (
-                    pyvista.Cube(center=centre, x_length=mark, y_length=mark, z_length=mark),
-                    False,
-                )
+        for patch in _patches(drawing, facets):
+            yield patch, one_axis
+        if facets or not support.directions:
+            continue
+        edge = mark if len(translations) > 1 else 0.6 * mark
+        for centre in spread(model.mesh.points[model.mesh.nodes(support.point)], mark):
+            cube = pyvista.Cube(center=centre, x_length=edge, y_length=edge, z_length=edge)
+            yield cube, one_axis
+
+
+def spread(points: FloatArray, apart: float) -> FloatArray:
+    """Points no two of which lie in one box of an edge length, of many.
+
+    Examples
+    --------
+    >>> spread(np.array([[0.0, 0, 0], [0.1, 0, 0], [1.2, 0, 0]]), 1.0)[:, 0].tolist()
+    [0.0, 1.2]
+    """
+    boxes = np.floor((points - points.min(axis=0)) / apart).astype(np.int64)
+    _, first = np.unique(boxes, axis=0, return_index=True)
+    return points[np.sort(first)]
 
 
 def _patches(drawing: StructureSurface, facets: dict[str, IntArray]) -> Iterator[Any]:
@@ -84,10 +102,10 @@ def _patches(drawing: StructureSurface, facets: dict[str, IntArray]) -> Iterator
         yield pyvista.PolyData(lifted.reshape(-1, 3), faces=faces)
 
 
-def mass_cubes(drawing: StructureSurface, stop: StopSphere | None) -> list[Cube]:
+def mass_cubes(drawing: StructureSurface, stops: Sequence[StopSphere]) -> list[Cube]:
     """A cube of steel for each lumped mass, with its centre where the mass has it.
 
-    One without an offset at the point that hits the stop stands on the side away from it.
+    One without an offset at a point that hits a stop stands on the side away from it.
     """
     import pyvista
 
@@ -98,7 +116,8 @@ def mass_cubes(drawing: StructureSurface, stop: StopSphere | None) -> list[Cube]
             node = model.mesh.node(lump.point)
             edge = (lump.mass / BLOCK_DENSITY) ** (1 / 3)
             centre = model.mesh.points[node] + np.asarray(lump.offset)
-            if stop is not None and model.mesh.node(stop.point) == node and not any(lump.offset):
+            stop = next((each for each in stops if model.mesh.node(each.point) == node), None)
+            if stop is not None and not any(lump.offset):
                 away = -direction_of(stop)
                 centre = centre + (reach_along(drawing, centre, away) + edge / 2.0) * away
             solid = pyvista.Cube(center=centre, x_length=edge, y_length=edge, z_length=edge)
@@ -113,9 +132,10 @@ def stop_bodies(drawing: StructureSurface, stop: StopSphere, scale: float) -> li
     point = mesh.points[mesh.node(stop.point)]
     towards = direction_of(stop)
     surface = reach_along(drawing, point, towards) + scale * stop.gap
-    centre = point + (surface + stop.radius) * towards
-    post = max(1.6 * MARK_FRACTION * size_of(drawing), 4.0 * stop.radius)
-    return sphere_on_post(centre, towards, stop.radius, post)
+    mark = MARK_FRACTION * size_of(drawing)
+    radius = stop.radius or drawn_radius(mark)
+    centre = point + (surface + radius) * towards
+    return sphere_on_post(centre, towards, radius, max(1.6 * mark, 4.0 * radius))
 
 
 def direction_of(stop: StopSphere) -> FloatArray:

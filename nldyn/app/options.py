@@ -88,10 +88,10 @@ json_option = click.option(
 )
 view_option = click.option(
     "--view",
-    type=click.Choice(["oblique", "front", "top", "side", "isometric"]),
-    default="oblique",
+    type=click.Choice(["motion", "oblique", "front", "top", "side", "isometric"]),
+    default="motion",
     show_default=True,
-    help="From where the pictures are taken; y is up.",
+    help="From where the pictures are taken: where the motion is seen best, or with y up.",
 )
 drawn_modes_option = click.option(
     "--modes",

@@ -19,6 +19,7 @@ from nldyn.io.store import load
 from nldyn.report.offline import Table, unpacked
 from nldyn.report.page import Drawn, write_page
 from nldyn.report.results import FILES, summary, tables_of
+from nldyn.report.stop_spheres import stops_to_draw
 from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.result_directory import OutputError, result_directory
 from nldyn.runtime.unfinished import unfinished_path
@@ -37,12 +38,14 @@ def drawn_of(scene: Scene | None, structure: Structure) -> Drawn | None:
     """The structure of a scene to be shown deflected, or what of it is of a mesh."""
     if scene is None or structure.reduced is None:
         return None
+    stops = stops_to_draw(scene)
     if scene.components:
-        return _drawn_parts(structure.parts, structure.reduced)
+        drawn = _drawn_parts(structure.parts, structure.reduced)
+        return drawn and replace(drawn, stops=stops)
     component = structure.component
     if scene.mesh is None or component is None or isinstance(component, cms.Matrices):
         return None
-    return Drawn(component, structure.reduced, scene.mesh.mirror)
+    return Drawn(component, structure.reduced, scene.mesh.mirror, stops)
 
 
 def _drawn_parts(parts: Mapping[str, AnyComponent], reduced: cms.ReducedModel) -> Drawn | None:

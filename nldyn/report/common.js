@@ -11,7 +11,6 @@ const FONT = { family: 'system-ui, "DejaVu Sans", sans-serif', size: 12, color: 
 const LINE = { showline: true, linecolor: "#888", mirror: true, ticks: "outside", gridcolor: "#eee", zerolinecolor: "#bbb" };
 const axis = (text, more) => ({ ...LINE, title: { text, standoff: 6 }, ...more });
 const FLAT = [["toImage", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]];
-const SPATIAL = [["toImage", "orbitRotation", "pan3d", "zoom3d", "resetCameraDefault3d"]];
 const config = (name, buttons = FLAT) => ({ responsive: true, displaylogo: false, scrollZoom: false,
   modeBarButtons: buttons, toImageButtonOptions: { filename: name, scale: 2 } });
 function digits(value, count = 6) {

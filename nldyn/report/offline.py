@@ -15,6 +15,7 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
+from fem.render.viewer import viewer_script, viewer_style
 from nldyn.base.version import software_version
 
 HERE = Path(__file__).parent
@@ -32,7 +33,7 @@ def write_html(path: Path, template: str, content: Mapping[str, Any]) -> None:
         The file.
     template : str
         Name of a file beside this one, in which ``__TITLE__``, ``__STYLE__``, ``__PLOTLY__``,
-        ``__DATA__`` and ``__COMMON__`` are filled in.
+        ``__DATA__``, ``__COMMON__`` and ``__VIEWER__`` are filled in.
     content : dict
         What the page shows, ready for JSON, with its ``title``.
     """
@@ -42,10 +43,11 @@ def write_html(path: Path, template: str, content: Mapping[str, Any]) -> None:
 
     parts = {
         "__TITLE__": html.escape(content["title"]),
-        "__STYLE__": text("common.css"),
+        "__STYLE__": f"{text('common.css')}\n{viewer_style()}",
         "__PLOTLY__": get_plotlyjs().replace("</script", "<\\/script"),
         "__DATA__": packed(content),
         "__COMMON__": text("common.js"),
+        "__VIEWER__": viewer_script(),
     }
     filled = re.sub("|".join(parts), lambda found: parts[found[0]], text(template))
     path.write_text(filled + "\n", encoding="utf-8")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fem.render.page import packed
+from fem.render.viewer import packed
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError
 from nldyn.branches.branch import Branch
@@ -220,21 +220,33 @@ def _figures(orbit: Orbit) -> dict[str, Any]:
     }
 
 
-def modal_motion(orbit: Orbit) -> tuple[Real, Real]:
-    """Instants (k,) in s and modal displacements (k, n): the deepest contact, then a period.
+def modal_motion(orbit: Orbit) -> dict[str, Any]:
+    """Modal displacements at instants of a period, for the viewer; at first the deepest contact.
 
-    Without a contact the largest observed displacement comes first.
+    Without a contact the largest observed displacement is shown first.
     """
     deepest = max(orbit.impact_list, key=lambda hit: hit.penetration, default=None)
     if deepest is not None:
-        phase = orbit.omega * deepest.time
+        first = orbit.omega * deepest.time
     else:
         extremes = orbit.observed_extremes
         largest = np.argmax(np.abs(extremes.values)) if extremes.values.size else None
-        phase = 0.0 if largest is None else float(extremes.phases[largest])
-    steps = np.linspace(0.0, 2.0 * math.pi * orbit.period, SHOWN_INSTANTS, endpoint=False)
-    states = np.vstack([orbit.states(np.array([phase])), drawn_states(orbit, steps)])
-    return np.concatenate([[phase], steps]) / orbit.omega, halves(states)[0]
+        first = 0.0 if largest is None else float(extremes.phases[largest])
+    phases = shown_phases(orbit, SHOWN_INSTANTS, first)
+    return {
+        "times": floats(phases / orbit.omega),
+        "period": orbit.duration,
+        "first": first / orbit.omega,
+        "coordinates": floats(halves(drawn_states(orbit, phases))[0]),
+    }
+
+
+def shown_phases(orbit: Orbit, count: int, first: float) -> Real:
+    """Phases at which a structure is shown: equal steps of a period, its contacts, one more."""
+    end = 2.0 * math.pi * orbit.period
+    steps = np.linspace(0.0, end, count, endpoint=False)
+    contacts = [orbit.omega * hit.time for hit in orbit.impact_list[:count]]
+    return np.unique(np.concatenate([steps, contacts, [first]]) % end)
 
 
 def stops_of(orbit: Orbit) -> dict[str, Any]:

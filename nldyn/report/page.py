@@ -28,7 +28,6 @@ from nldyn.report.orbit_content import (
     ChosenOrbit,
     chosen_orbits,
     even,
-    floats,
     known,
     modal_motion,
     orbit_content,
@@ -39,6 +38,7 @@ from nldyn.search.diagram import Diagram
 
 if TYPE_CHECKING:
     import cms
+    from fem.render import StopSphere
     from fem.render.pictures import AnyComponent
     from nldyn.orbits.orbit import Orbit
     from nldyn.scene.schema import Scene
@@ -59,16 +59,19 @@ class Drawn:
         What it was reduced to: the modal coordinates are those of the orbits.
     mirror : str, optional
         A point on a plane of symmetry, to draw half a frame whole.
+    stops : sequence of fem.render.StopSphere
+        The stops that can be drawn.
     """
 
     component: AnyComponent
     reduced: cms.ReducedModel
     mirror: str | None = None
+    stops: Sequence[StopSphere] = ()
 
     @property
     def surface(self) -> dict[str, Any]:
         """What the page shows of it, see `surface_content`."""
-        return surface_content(self.component, self.reduced, self.mirror)
+        return surface_content(self.component, self.reduced, self.mirror, self.stops)
 
 
 def write_page(
@@ -153,8 +156,7 @@ def page_content(
         content["surface"] = surface
         for shown, each in zip(orbits, chosen, strict=True):
             if "fault" not in shown:
-                time, modal = modal_motion(each.orbit)
-                shown |= {"shown_time": floats(time), "modal": floats(modal)}
+                shown["motion"] = modal_motion(each.orbit)
     return content
 
 

@@ -14,16 +14,17 @@ from nldyn.base.errors import SceneError
 from nldyn.plot.diagram import orbit_title
 from nldyn.report.again import drawn_of
 from nldyn.report.modes import check_modes, mode_table
+from nldyn.report.orbit_content import shown_phases
 from nldyn.report.results import write_table
+from nldyn.report.stop_spheres import stop_sphere, stops_to_draw
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.runtime.result_directory import result_directory
-from nldyn.scene.build import Structure, build_structure, build_system, place
+from nldyn.scene.build import Structure, build_structure, build_system
 from nldyn.scene.checks import check_computable
 from nldyn.scene.messages import scene_error
 
 if TYPE_CHECKING:
     import cms
-    from fem.render import StopSphere
     from fem.render.pictures import AnyComponent
     from nldyn.orbits.orbit import Impact, Orbit
     from nldyn.report.comparison import Comparison
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from nldyn.scene.schema import Scene
     from nldyn.system.system import System
 
-DRAWN_RADIUS = 0.005
 FRAMES = 60
 WINDOW = (1280, 720)  # in pixels, of modes on a screen
 
@@ -63,7 +63,7 @@ def render_scene(
     period: int = 1,
     video: str = "gif",
     modes: Sequence[int] = (),
-    view: str = "oblique",
+    view: str = "motion",
     progress: Progress | None = None,
     jobs: int = 1,
 ) -> Rendering:
@@ -89,7 +89,8 @@ def render_scene(
     modes : sequence of int
         Modes to draw, from 1; all unless given.
     view : str
-        From where the pictures are taken: one of `fem.render.VIEWS`.
+        From where the pictures are taken: one of `fem.render.VIEWS`, or "motion", from where what
+        moves is seen best.
     progress : callable, optional
         Called as ``progress(what, frequency_hz, done)``; the frequency is 0 where none applies.
     jobs : int
@@ -191,14 +192,23 @@ def deepest_impact(scene: Scene, orbit: Orbit) -> Impact | None:
     return max(hits, key=lambda hit: hit.penetration, default=None)
 
 
+def deepest_phase(orbit: Orbit, impact: Impact | None) -> float:
+    """Phase at a contact's deepest instant, or without one at the largest extreme."""
+    if impact is not None:
+        return float(orbit.omega * impact.time)
+    extremes = orbit.observed_extremes
+    return float(extremes.phases[np.argmax(np.abs(extremes.values))])
+
+
 def deepest_state(orbit: Orbit, impact: Impact | None) -> NDArray[np.float64]:
     """Modal displacements at a contact's deepest instant, or without one at the largest extreme."""
-    if impact is not None:
-        phase = orbit.omega * impact.time
-    else:
-        extremes = orbit.observed_extremes
-        phase = float(extremes.phases[np.argmax(np.abs(extremes.values))])
-    return orbit.states(np.array([phase]))[0, : orbit.system.size]
+    return orbit.states(np.array([deepest_phase(orbit, impact)]))[0, : orbit.system.size]
+
+
+def what_is_drawn(orbit: Orbit, impact: Impact | None) -> str:
+    """The title of the picture of an orbit's deepest contact."""
+    what = "largest deflection" if impact is None else "deepest contact"
+    return f"{what} of the {orbit_title(orbit, digits=5)}"
 
 
 def render_modes_of(
@@ -207,7 +217,7 @@ def render_modes_of(
     directory: str | Path,
     *,
     modes: Sequence[int] = (),
-    view: str = "oblique",
+    view: str = "motion",
     against: Comparison | None = None,
     animated: bool = False,
 ) -> str:
@@ -226,7 +236,7 @@ def render_modes_of(
     modes : sequence of int
         Those to draw, from 1; all unless given.
     view : str
-        From where the picture is taken: one of `fem.render.VIEWS`.
+        From where the picture is taken, as for `render_scene`.
     against : Comparison, optional
         What `compare_modes` gave for this scene and another.
     animated : bool
@@ -260,7 +270,7 @@ def render_modes_of(
 
 
 def modes_in_window(
-    scene: Scene, structure: Structure, modes: Sequence[int] = (), view: str = "oblique"
+    scene: Scene, structure: Structure, modes: Sequence[int] = (), view: str = "motion"
 ) -> Any:
     """The modes of a scene as a pyvista plotter, which opens a window by its ``show()``.
 
@@ -301,33 +311,6 @@ def save_orbit(orbit: Orbit, folder: Path) -> None:
     save_figure(plot_orbit(orbit)[0], folder / "orbit")
 
 
-def stop_sphere(scene: Scene, index: int) -> StopSphere | None:
-    """Give a stop as a sphere to be drawn, if it acts along an axis."""
-    from fem.render import StopSphere
-
-    axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-    stop = scene.stops[index]
-    part, name, of = scene, stop.at, ""
-    if scene.components:
-        component, name = place(stop.at)
-        part, of = scene.component_scenes[component], f"{component}."
-    interface = part.interfaces.get(name)
-    if interface is None or interface.direction not in axes:
-        return None
-    way = tuple(stop.direction * along for along in axes[interface.direction])
-    if part.mesh is None or part.mesh.model == "frame":
-        way = way[:2]
-    return StopSphere(of + interface.at, stop.radius or DRAWN_RADIUS, way, stop.gap)
-
-
-def stop_to_draw(scene: Scene, impact: Impact | None) -> StopSphere | None:
-    """Give the stop of a contact; where nothing is touched, the first that can be drawn."""
-    if impact is not None:
-        return stop_sphere(scene, impact.stop)
-    spheres = (stop_sphere(scene, index) for index in range(len(scene.stops)))
-    return next((sphere for sphere in spheres if sphere is not None), None)
-
-
 @dataclass(frozen=True)
 class Drawing:
     """The pages for a browser, and the pictures, which need a graphics library."""
@@ -338,7 +321,7 @@ class Drawing:
     folder: Path
     tell: Progress
     modes: tuple[int, ...] = ()
-    view: str = "oblique"
+    view: str = "motion"
 
     @classmethod
     def of(
@@ -410,26 +393,32 @@ class Drawing:
             self.folder / "mode_shapes.html",
             heading=self.scene.title or "Mode shapes",
             mirror=_mirror(self.scene),
+            stops=stops_to_draw(self.scene),
         )
 
     def pages(self, orbit: Orbit | None) -> None:
-        """Write the modes, and the stress at the deepest contact, as pages for a browser."""
-        from fem.render import write_page
+        """Write the modes, and the orbit at its deepest contact, as pages for a browser."""
+        from fem.render import write_motion
 
         self.mode_page()
         if orbit is None:
             return
         impact = deepest_impact(self.scene, orbit)
-        what = "largest deflection" if impact is None else "deepest contact"
-        write_page(
+        deepest = deepest_phase(orbit, impact)
+        phases = shown_phases(orbit, FRAMES, deepest)
+        states = orbit.states(phases)[:, : orbit.system.size]
+        write_motion(
             self.component,
-            self.reduced.expand(deepest_state(orbit, impact))[:, None],
-            [f"{what} of the {orbit_title(orbit)}"],
+            self.reduced.expand(states.T).T,
             self.folder / "deepest_contact.html",
+            times=phases / orbit.omega,
+            period=orbit.duration,
+            first=deepest / orbit.omega,
+            title=what_is_drawn(orbit, impact),
             heading=self.scene.title or "Deepest contact",
             mirror=_mirror(self.scene),
             colour="stress",
-            relative=False,
+            stops=stops_to_draw(self.scene),
         )
 
     @property
@@ -449,6 +438,7 @@ class Drawing:
             self.mode_titles,
             path,
             mirror=_mirror(self.scene),
+            stops=stops_to_draw(self.scene),
             view=self.view,
         )
 
@@ -503,35 +493,37 @@ class Drawing:
 
         self.tell("deepest contact", 0.0, 0.3)
         impact = deepest_impact(self.scene, orbit)
-        what = "largest deflection" if impact is None else "deepest contact"
         state = self.reduced.expand(deepest_state(orbit, impact))
-        stop = stop_to_draw(self.scene, impact)
+        stops = stops_to_draw(self.scene)
         for name, colour in (("contact", "displacement"), ("contact_stress", "stress")):
             render_shape(
                 self.component,
                 state,
                 self.folder / f"deepest_{name}.png",
-                title=f"{what} of the {orbit_title(orbit)}",
-                scale=self.visible_scale(state, impact.penetration if impact else 0.0, stop),
-                stop=stop,
+                title=what_is_drawn(orbit, impact),
+                scale=self.visible_scale(state, impact),
+                stops=stops,
                 mirror=_mirror(self.scene),
                 colour=colour,
                 view=self.view,
             )
 
-    def visible_scale(
-        self, state: NDArray[np.float64], penetration: float, stop: StopSphere | None
-    ) -> float:
+    def visible_scale(self, state: NDArray[np.float64], impact: Impact | None) -> float:
         """Factor on the deflection at which the stop is not drowned in what it dents."""
-        from fem.render.pictures import automatic_scale, round_number, surface_of
+        from fem.render.frame_scenery import MARK_FRACTION, drawn_radius
+        from fem.render.pictures import automatic_scale, extent, round_number, surface_of
 
-        factor = automatic_scale(surface_of(self.component, _mirror(self.scene)), state[None])
-        if stop is None or penetration == 0.0:
+        drawing = surface_of(self.component, _mirror(self.scene))
+        factor = automatic_scale(drawing, state[None])
+        stop = None if impact is None else stop_sphere(self.scene, impact.stop)
+        if impact is None or stop is None:
             return factor
-        return min(factor, round_number(2.0 * stop.radius / penetration))
+        size = extent(drawing.place(np.zeros_like(state))[0])
+        radius = stop.radius or drawn_radius(MARK_FRACTION * size)
+        return min(factor, round_number(2.0 * radius / impact.penetration))
 
     def motion(self, orbit: Orbit, video: str) -> None:
-        """Animate one period of the orbit, with the stop of the deepest contact."""
+        """Animate one period of the orbit."""
         from fem.render import animate
 
         self.tell("animation", 0.0, 0.5)
@@ -541,8 +533,8 @@ class Drawing:
             self.reduced.expand(history.modal[:-1].T).T,
             self.folder / f"motion.{video}",
             times=history.time[:-1],
-            title=f"one period of the {orbit_title(orbit)}",
-            stop=stop_to_draw(self.scene, deepest_impact(self.scene, orbit)),
+            title=f"one period of the {orbit_title(orbit, digits=5)}",
+            stops=stops_to_draw(self.scene),
             mirror=_mirror(self.scene),
             view=self.view,
         )

@@ -38,5 +38,5 @@ def test_the_page_on_modes_shows_them(monkeypatch):
     (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.S)
     exec(code, {})
     in_table = re.findall(r"^ +\d +([\d.]+) +\d", text, flags=re.M)
-    assert titles == [f"{float(hz):.1f} Hz" for hz in in_table]
+    assert titles == [f"{float(hz):.1f} Hz, along y" for hz in in_table]
     assert len(titles) == 3

@@ -55,7 +55,7 @@ def colours(image):
 def test_shape(with_gl, half_beam, sagging, tmp_path):
     path = tmp_path / "shape.png"
     stop = StopSphere("middle", 0.005)
-    factor = render_shape(half_beam, sagging, path, title="Sagging", stop=stop, size=(800, 450))
+    factor = render_shape(half_beam, sagging, path, title="Sagging", stops=[stop], size=(800, 450))
     image = iio.imread(path)
     assert image.shape[:2] == (450, 800)
     assert colours(image) > 10_000
@@ -68,8 +68,8 @@ def test_shape(with_gl, half_beam, sagging, tmp_path):
 def test_stop_and_mirror_show(with_gl, half_beam, sagging, tmp_path):
     path = tmp_path / "a.png"
     red = []
-    for stop in (None, StopSphere("middle", 0.02)):
-        render_shape(half_beam, sagging, path, stop=stop, mirror="middle", size=(600, 300))
+    for stops in ((), [StopSphere("middle", 0.02)]):
+        render_shape(half_beam, sagging, path, stops=stops, mirror="middle", size=(600, 300))
         pixels = iio.imread(path).astype(int)
         red.append(np.count_nonzero((pixels[..., 0] > 120) & (pixels[..., 1:3].max(-1) < 60)))
     assert red[0] == 0
@@ -251,7 +251,7 @@ def test_bad_requests(half_beam, sagging, tmp_path):
 
 def test_unknown_stop(half_beam, sagging, tmp_path):
     with pytest.raises(fem.ModelError, match="there is no point 'centre'"):
-        render_shape(half_beam, sagging, tmp_path / "a.png", stop=StopSphere("centre", 0.01))
+        render_shape(half_beam, sagging, tmp_path / "a.png", stops=[StopSphere("centre", 0.01)])
 
 
 @pytest.mark.parametrize(
@@ -280,10 +280,10 @@ def test_stop_touches_the_beam_at_rest(half_beam):
 
 def test_mass_is_a_block_of_steel_away_from_the_stop(half_beam):
     stop = StopSphere("middle", 0.005)
-    (block,) = mass_blocks(frame_surface(half_beam, mirror="middle"), stop)
+    (block,) = mass_blocks(frame_surface(half_beam, mirror="middle"), [stop])
     assert block.solid.volume * 7800.0 == pytest.approx(2 * 0.19, rel=1e-4)
     assert block.solid.bounds[3] == pytest.approx(-0.005, abs=1e-6)
-    (half,) = mass_blocks(frame_surface(half_beam), stop)
+    (half,) = mass_blocks(frame_surface(half_beam), [stop])
     assert half.solid.volume * 7800.0 == pytest.approx(0.19, rel=1e-4)
     assert half.solid.bounds[1] == pytest.approx(0.66, abs=1e-6)
     shape = np.zeros((10, 3))
@@ -296,6 +296,10 @@ def test_scales_are_round_and_units_readable():
     assert [pictures.round_number(x) for x in (1.0, 0.199, 4.99, 5.0, 9.9e4)] == [
         1.0, 0.1, 2.0, 5.0, 5e4,
     ]  # fmt: skip
+    for largest in (5.05, 1.54e-3, 1.0, 999.0, 12.0):
+        top, parts = pictures.round_range(largest)
+        assert largest <= top <= 1.51 * largest
+        assert float(f"{top / parts:.1g}") == pytest.approx(top / parts), "ticks are not round"
     assert pictures.length_unit(4e-6) == ("µm", 1e6)
     assert pictures.length_unit(0.9e-3) == ("mm", 1e3)
     assert pictures.length_unit(0.7) == ("m", 1.0)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import html
+import itertools
+import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import imageio.v3 as iio
 import numpy as np
@@ -19,11 +23,15 @@ from fem.render import (
     render_comparison,
     render_modes,
     render_shape,
+    write_motion,
     write_page,
 )
 from fem.render.colouring import surface_values
 from fem.render.frame_surface import frame_surface
+from fem.render.page import shapes_of
+from fem.render.structure_scenery import support_marks
 from fem.render.structure_surface import structure_surface
+from fem.render.views import view_of_motion
 
 STEEL = fem.Material(2.0e11, 8000.0, 0.3)
 CLAMP = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
@@ -147,7 +155,7 @@ def test_pictures_of_solids_and_sheets(with_gl, bar, tmp_path):
     stop = StopSphere("tip", 0.005, (0.0, 1.0, 0.0))
     for colour in ("displacement", "stress"):
         path = tmp_path / f"{colour}.png"
-        render_shape(component, u, path, stop=stop, colour=colour, size=(640, 360))
+        render_shape(component, u, path, stops=[stop], colour=colour, size=(640, 360))
         assert colours(iio.imread(path)) > 3_000
     render_modes(component, np.stack([u, -u], axis=1), ["one", "other"], tmp_path / "modes.png")
     sheet = fem.assemble(
@@ -188,40 +196,48 @@ def test_a_page_holds_its_text_and_nothing_from_elsewhere(bar, tmp_path):
     component, u = bar
     path = tmp_path / "bar.html"
     title = "</script><b>one</b> & more"
-    write_page(component, u[:, None], [title], path, heading="A <bar>", relative=False)
+    write_page(component, u[:, None], [title], path, heading="A <bar>")
     text = path.read_text(encoding="utf-8")
-    assert not re.search(r"(src|href)=|https?://", text)
+    assert not re.search(r"""(src|href)=["'](?!data:)|https?://""", text)
     assert text.count("</script>") == 2
     assert "<title>A &lt;bar&gt;</title>" in text
 
 
 TURNING = """
 <script>
-find("moving").checked = false;
-draw(0);
-const before = canvas.toDataURL();
-canvas.setPointerCapture = () => {};
-for (const [kind, x] of [["pointerdown", 200], ["pointermove", 300], ["pointerup", 300]])
-  canvas.dispatchEvent(new PointerEvent(kind, { clientX: x, clientY: 200, pointerId: 1 }));
-draw(0);
-const pixels = new Uint8Array(4 * canvas.width * canvas.height);
-gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-let coloured = 0;
-for (let i = 0; i < pixels.length; i += 4) {
-  const [r, g, b] = pixels.slice(i, i + 3);
-  if (Math.max(r, g, b) - Math.min(r, g, b) > 40) coloured += 1;
+const page = { x: 100, y: 200, pointerId: 1 };
+viewer.canvas.setPointerCapture = () => {};
+function pixels() {
+  viewer.drawNow();
+  const { gl, canvas } = viewer, found = new Uint8Array(4 * canvas.width * canvas.height);
+  gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, found);
+  return found;
 }
-document.body.dataset.turned = canvas.toDataURL() !== before;
-document.body.dataset.coloured = coloured;
+function where(is) { // mean height of the pixels of a colour, and their number
+  const all = pixels(), width = viewer.canvas.width;
+  let count = 0, sum = 0;
+  for (let i = 0; i < all.length; i += 4)
+    if (is(all[i], all[i + 1], all[i + 2])) { count += 1; sum += Math.floor(i / 4 / width); }
+  return [count, sum / count];
+}
+const coloured = (r, g, b) => Math.max(r, g, b) - Math.min(r, g, b) > 40;
+const red = (r, g, b) => r > 90 && g < 60 && b < 60;
+const told = [0, 0.25, 0.5, 0.75].map((part) => {
+  viewer.setPhase(part);
+  return { surface: where((...c) => coloured(...c) && !red(...c)), stop: where(red) };
+});
+const before = String(pixels());
+for (const [kind, x] of [["pointerdown", 200], ["pointermove", 300], ["pointerup", 300]])
+  viewer.canvas.dispatchEvent(new PointerEvent(kind, { clientX: x, clientY: 200, pointerId: 1 }));
+document.body.dataset.turned = String(pixels()) !== before;
+document.body.dataset.told = JSON.stringify(told);
+document.body.dataset.state = viewer.root.dataset.state;
 </script>
 """
 
 
-@pytest.mark.skipif(not BROWSER, reason="no Chromium on this machine")
-def test_a_browser_draws_the_page_and_turns_it(bar, tmp_path):
-    component, u = bar
-    path = tmp_path / "bar.html"
-    write_page(component, u[:, None], ["bent"], path)
+def in_browser(path, tmp_path):
+    """What a page tells of its picture at four instants, and whether it can be turned."""
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace("</body>", TURNING + "</body>"), encoding="utf-8")
     run = subprocess.run(
@@ -231,8 +247,73 @@ def test_a_browser_draws_the_page_and_turns_it(bar, tmp_path):
         capture_output=True, text=True, timeout=120, check=False,
     )  # fmt: skip
     body = re.search(r"<body[^>]*>", run.stdout)[0]
-    if 'data-state="no WebGL 2"' in body:
+    if 'data-state="no WebGL 2"' in run.stdout:
         pytest.skip("this Chromium has no WebGL 2")
     assert 'data-state="drawn"' in body
     assert 'data-turned="true"' in body
-    assert int(re.search(r'data-coloured="(\d+)"', body)[1]) > 3_000
+    return json.loads(html.unescape(re.search(r'data-told="([^"]*)"', body)[1]))
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium on this machine")
+def test_a_browser_swings_a_mode_to_both_sides(bar, tmp_path):
+    component, u = bar
+    path = tmp_path / "bar.html"
+    write_page(component, u[:, None], ["bent"], path)
+    high, middle, low, again = (each["surface"] for each in in_browser(path, tmp_path))
+    assert min(high[0], low[0]) > 2_000
+    assert high[1] > low[1] + 5  # rows of the picture, from below
+    assert middle[0] == again[0] == 0  # without displacement nothing is coloured
+
+
+@pytest.mark.skipif(not BROWSER, reason="no Chromium on this machine")
+def test_a_browser_plays_a_motion_that_stays_on_its_side_of_the_stop(bar, tmp_path):
+    """It goes down and back, never up, as the states that were given; the stop stands still."""
+    component, u = bar
+    path = tmp_path / "bar.html"
+    times = np.arange(8) / 8
+    states = -np.outer(0.5 * (1.0 - np.cos(2.0 * np.pi * times)), u)
+    stop = StopSphere("tip", 0.01, (0.0, 1.0, 0.0), gap=0.5 * np.abs(u).max())
+    write_motion(
+        component, states, path, times=times, period=1.0, title="down and back", stops=[stop],
+        colour="stress",
+    )  # fmt: skip
+    rest, quarter, lowest, back = in_browser(path, tmp_path)
+    heights = [each["surface"][1] for each in (rest, quarter, lowest)]
+    assert heights[0] > heights[1] > heights[2]
+    assert back["surface"] == pytest.approx(quarter["surface"], rel=0.02)
+    assert len({tuple(each["stop"]) for each in (rest, lowest)}) == 1 and rest["stop"][0] > 20
+
+
+def test_shapes_of_a_motion_give_its_states_back(bar):
+    _, u = bar
+    states = np.array([u, -0.5 * u, u + 1e-3 * np.abs(u).max() * np.cos(np.arange(len(u)))])
+    shapes, coordinates = shapes_of(states)
+    assert shapes.shape[1] == 2
+    np.testing.assert_allclose(coordinates @ shapes.T, states, atol=1e-9 * np.abs(u).max())
+
+
+def test_held_faces_and_edges_of_solids_are_marked_where_they_are():
+    """A face by a patch on it, the nodes of an edge by cubes around them."""
+    mesh = fem.box_mesh("bar", (0.5, 0.02, 0.03), (10, 1, 1))
+    edge = np.flatnonzero((mesh.points[:, 0] > 0.499) & (mesh.points[:, 1] < 1e-9))
+    mesh = replace(mesh, point_sets={**mesh.point_sets, "edge": edge})
+    supports = [fem.Support("x0", ("x", "y", "z")), fem.Support("edge", "y")]
+    component = fem.assemble(fem.StructureModel(mesh, {"bar": fem.SolidPart(STEEL)}, supports))
+    (face, *cubes), planes = zip(*support_marks(structure_surface(component)), strict=True)
+    assert planes == (False, *[True] * len(cubes))
+    assert np.allclose(np.asarray(face.points)[:, 0], 0.0, atol=2e-3)
+    assert face.area == pytest.approx(0.02 * 0.03, rel=0.1)
+    centres = np.array([cube.center for cube in cubes])
+    np.testing.assert_allclose(centres, mesh.points[edge], atol=1e-12)
+
+
+def test_a_view_shows_what_moves():
+    """Of a plate in x-y, of one in x-z and of a rod along z, most of each motion is seen."""
+    sides = {"x-y": (1.0, 0.6, 0.01), "x-z": (1.0, 0.01, 0.6), "rod": (0.05, 0.05, 1.0)}
+    for name, way in itertools.product(sides, np.eye(3)):
+        corners = np.array(list(itertools.product((0.0, 1.0), repeat=3))) * sides[name]
+        axes = view_of_motion(corners, np.tile(way, (8, 1)))
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(axes) == pytest.approx(1.0)
+        assert np.linalg.norm(axes[:2] @ way) > 0.9
+        assert np.linalg.norm(axes[:2] @ sides[name]) > 0.75 * np.linalg.norm(sides[name])

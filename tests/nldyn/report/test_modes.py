@@ -8,7 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 import cms
-import fem
+import fem.render
+from fem.render.views import axes_of_view
 from nldyn.app.cli import main
 from nldyn.base.resources import example
 from nldyn.report.modes import mode_table
@@ -65,7 +66,7 @@ def test_modes_that_are_not_there_and_other_views_are_refused(tmp_path):
     for command in (("modes", BEAM), ("render", BEAM, "--out", tmp_path / "out")):
         result = invoke(*command, "--modes", "9")
         assert result.exit_code == 2 and "has modes 1 to 4, no mode 9" in result.stderr
-        assert "is not one of 'oblique', 'front'" in invoke(*command, "--view", "under").stderr
+        assert "is not one of 'motion', 'oblique'" in invoke(*command, "--view", "under").stderr
     assert not (tmp_path / "out").exists()
     assert invoke("modes", BEAM, "--open").stderr == "nldyn: '--open' needs '--out'\n"
 
@@ -94,8 +95,9 @@ def test_a_view_looks_along_its_direction(view):
     pyvista = pytest.importorskip("pyvista")
     plotter = pyvista.Plotter(off_screen=True)
     plotter.add_mesh(pyvista.Box((0.0, 3.0, 0.0, 2.0, 0.0, 1.0)))
-    back = fem.render.pictures.checked_view(view)
-    fem.render.pictures.fit_camera(plotter, (800, 600), back)
+    axes = axes_of_view(view, np.zeros((1, 3)), np.zeros((1, 3)))
+    back = np.array(fem.render.VIEWS[view]) / np.linalg.norm(fem.render.VIEWS[view])
+    fem.render.pictures.fit_camera(plotter, (800, 600), axes)
     eye, focus, up = map(np.array, plotter.camera_position)
     np.testing.assert_allclose((eye - focus) / np.linalg.norm(eye - focus), back, atol=1e-12)
     assert abs(up @ back) < 1e-12

@@ -2,6 +2,7 @@
 
 import csv
 
+import numpy as np
 import pytest
 from browser import opened, skip_without_browser, until
 
@@ -32,11 +33,6 @@ return [...document.querySelectorAll("#diagram .hoverlayer text")].map((t) =>
 CURVES = """
 return ["history", "force", "portrait", "spectrum", "circle"].map((name) =>
   document.getElementById(name).data[0].x.length);
-"""
-HALF_A_PERIOD_LATER = """
-const slider = document.getElementById("instant");
-slider.value = 18;
-slider.dispatchEvent(new Event("input"));
 """
 COLUMN = """
 return [...document.querySelectorAll("#table tbody tr")].map((row) =>
@@ -80,6 +76,21 @@ def pointer(browser, x, y):
     return chain
 
 
+def test_click_on_a_special_point_shows_its_very_orbit(browser, folder):
+    with (folder / "special_points.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    marks = [mark for mark in browser.execute_script(MARKS) if mark[0] == "special"]
+    assert len(marks) == len(rows)
+    places = np.array([browser.execute_script(AT, x, y) for *_, x, y in marks])
+    apart = np.linalg.norm(places[:, None] - places, axis=-1) + 1e3 * np.eye(len(places))
+    alone = [mark for mark, nearest in zip(marks, apart.min(axis=1), strict=True) if nearest > 15]
+    assert alone
+    for *_, x, y in alone:
+        pointer(browser, x, y).click().perform()
+        until(lambda x=x: f"at {x:.7g} Hz" in text_of(browser, "which"))
+        assert text_of(browser, "said") == ""
+
+
 def find(browser, css):
     return browser.find_element("css selector", css)
 
@@ -120,12 +131,18 @@ def test_drag_enlarges_and_double_click_brings_the_whole_back(browser):
 
 
 def test_the_structure_is_deflected_and_goes_through_its_period(browser):
-    points = "return document.getElementById('shape').data[0].y"
-    deepest = browser.execute_script(points)
-    browser.execute_script(HALF_A_PERIOD_LATER)
-    later = browser.execute_script(points)
-    assert len(later) == len(deepest) and later != deepest
-    assert "times as large" in text_of(browser, "scaled")
+    slider, said = ".viewer-instant", ".viewer-said"
+    first = find(browser, said).text
+    assert "deflection drawn ×" in first and "red: the stop" in first
+    picture = "return viewer.drawNow(), viewer.canvas.toDataURL()"
+    browser.execute_script("window.viewer = viewerOfPage")
+    deepest = browser.execute_script(picture)
+    browser.execute_script(
+        "const slider = document.querySelector(arguments[0]); slider.value = (Number(slider.value)"
+        " + 0.5) % 1; slider.dispatchEvent(new Event('input'))", slider,
+    )  # fmt: skip
+    assert browser.execute_script(picture) != deepest
+    until(lambda: find(browser, said).text != first)
 
 
 def test_tables_are_sorted_and_downloaded(browser, folder):

@@ -2,6 +2,7 @@
 
 import csv
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -13,8 +14,8 @@ from nldyn.report.render import (
     deepest_state,
     orbit_to_draw,
     render_scene,
-    stop_to_draw,
 )
+from nldyn.report.stop_spheres import stops_to_draw
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene, parse_scene
 
@@ -71,7 +72,7 @@ def test_scene_without_mesh_cannot_be_drawn(tmp_path):
 
 
 def test_stop_is_drawn_where_the_interface_is():
-    stop = stop_to_draw(load_scene(BEAM), None)
+    (stop,) = stops_to_draw(load_scene(BEAM))
     assert (stop.point, stop.direction, stop.gap) == ("middle", (0.0, 1.0), 0.0)
 
 
@@ -96,7 +97,7 @@ def beam_between_stops():
     return parse_scene(head + turn + never + hard + below + turning + rest, BEAM)
 
 
-def test_pictures_show_the_stop_of_the_deepest_contact(tmp_path, monkeypatch):
+def test_pictures_show_all_stops_that_lie_along_an_axis(tmp_path, monkeypatch):
     drawn = {}
 
     def draw(component, states, path, **options):
@@ -111,10 +112,14 @@ def test_pictures_show_the_stop_of_the_deepest_contact(tmp_path, monkeypatch):
     depth = orbit.history(20_000).penetration.max(axis=0)
     assert depth[0] < 0.0 < depth[1] < depth[2] < depth[3]
     component, u, options = drawn["deepest_contact.png"]
-    for stop in (options["stop"], drawn["motion.gif"][2]["stop"]):
-        assert (stop.point, stop.direction, stop.gap) == ("middle", (0.0, -1.0), 0.0)
+    for stops in (options["stops"], drawn["motion.gif"][2]["stops"]):
+        places = [(stop.point, stop.direction, stop.gap) for stop in stops]
+        assert places == [
+            ("middle", (0.0, 1.0), 1.0), ("middle", (0.0, 1.0), 0.0), ("middle", (0.0, -1.0), 0.0),
+        ]  # fmt: skip
     assert -component.interfaces["middle"] @ u == pytest.approx(depth[2], rel=1e-6)
-    within_stop = fem.render.pictures.round_number(2.0 * options["stop"].radius / depth[2])
+    size = np.linalg.norm(np.ptp(component.model.mesh.points, axis=0))
+    within_stop = fem.render.pictures.round_number(2.0 * 0.01 * 2.0 * size / depth[2])
     assert options["scale"] == pytest.approx(within_stop)
 
 

@@ -17,7 +17,7 @@ from nldyn import SceneError, solve_orbit
 from nldyn.app.cli import main
 from nldyn.base.resources import example
 from nldyn.report.again import drawn_of
-from nldyn.report.render import stop_to_draw
+from nldyn.report.stop_spheres import stops_to_draw
 from nldyn.scene.backbone import undamped
 from nldyn.scene.build import build_parts, build_reduced, build_structure, build_system
 from nldyn.scene.case_fingerprints import case_fingerprints
@@ -324,7 +324,7 @@ def test_of_a_mesh_and_matrices_the_mesh_is_drawn(tmp_path, monkeypatch):
     assert {"mode_shapes.html", "deepest_contact.html", "orbit.png"} < {
         path.name for path in out.iterdir()
     }
-    stop = stop_to_draw(load_scene(scene), None)
+    (stop,) = stops_to_draw(load_scene(scene))
     assert (stop.point, stop.direction, stop.gap) == ("frame.CORNER-R", (1.0, 0.0), 2e-3)
 
 
