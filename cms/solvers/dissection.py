@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,13 +13,17 @@ from scipy.sparse import csgraph
 from cms.base.arrays import FloatArray, IntArray, SparseMatrix
 from cms.component.component import times
 
-LEAF = 200  # rows that are eliminated together without being cut once more
+LEAF = 100  # rows that are eliminated together without being cut once more
 LANDMARKS = 20
 SMOOTHINGS = 40
-CUTS = (0.5, 0.47, 0.53)  # shares of a part on one side of the cuts that are tried
+BAND = 0.15  # of a part, to both sides of its middle: where its separators are sought
 LONG = 0.6  # axes along which a part is this long, relative to its longest, are tried
 FLAT = 1e-12  # of the largest variance: a graph without an extent that way
 TINY = 1e-300  # in place of a divisor that is zero
+LOW, MIDDLE, HIGH = 0, 1, 2
+
+Mask = NDArray[np.bool_]
+Edges = tuple[IntArray, IntArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +99,9 @@ def dissected(matrix: SparseMatrix) -> Elimination:
     Notes
     -----
     Rows of one pattern (those of a node) are one vertex of the graph. Its vertices get coordinates
-    from their distances to a few landmarks far from each other [1]_; the graph is cut across the
-    longest extent, the smaller of the two boundaries is the separator, and so on with both halves
-    [2]_.
+    from their distances to a few landmarks far from each other [1]_; the graph is cut across its
+    longest extents, the lightest separator near the middle is taken [3]_, and so on with both
+    halves [2]_.
 
     References
     ----------
@@ -104,6 +109,9 @@ def dissected(matrix: SparseMatrix) -> Elimination:
        points. Technical report, Stanford University.
     .. [2] George, A. (1973) Nested dissection of a regular finite element mesh. SIAM Journal on
        Numerical Analysis 10(2), 345-363.
+    .. [3] Ashcraft, C. and Liu, J.W.H. (1998) Applications of the Dulmage-Mendelsohn decomposition
+       and network flow to graph bisection improvement. SIAM Journal on Matrix Analysis and
+       Applications 19(2), 325-354.
     """
     vertex = vertices(matrix)
     graph = quotient_graph(matrix, vertex)
@@ -201,7 +209,7 @@ def cut(
     """Vertices of every front, children first, and the numbers of each front's children."""
     groups: list[IntArray] = []
     children: list[tuple[int, ...]] = []
-    side = np.full(graph.shape[0], -1, dtype=np.int8)
+    place = np.full(graph.shape[0], -1, dtype=np.int32)
 
     def parted(part: IntArray) -> tuple[int, ...]:
         """Append the fronts of a part; the numbers of its topmost ones."""
@@ -209,11 +217,14 @@ def cut(
             groups.append(part)
             children.append(())
             return (len(groups) - 1,)
-        left, right, between = halves(graph, part, coordinates[part], side)
-        below = tuple(n for half in (left, right) if half.size for n in parted(half))
-        if not between.size:
+        edges = edges_within(graph, part, place)
+        low, between = separator(edges, weights[part], coordinates[part])
+        below = tuple(
+            n for half in (low, ~low & ~between) if half.any() for n in parted(part[half])
+        )
+        if not between.any():
             return below
-        groups.append(between)
+        groups.append(part[between])
         children.append(below)
         return (len(groups) - 1,)
 
@@ -221,31 +232,86 @@ def cut(
     return groups, children
 
 
-def halves(
-    graph: SparseMatrix, part: IntArray, coordinates: FloatArray, side: NDArray[np.int8]
-) -> tuple[IntArray, IntArray, IntArray]:
-    """Two halves of a part without edges between them, and what lies between."""
+def edges_within(graph: SparseMatrix, part: IntArray, place: IntArray) -> tuple[IntArray, IntArray]:
+    """Both ends of all edges of a part, each both ways, by their places in it.
+
+    ``place`` (n,) is -1 throughout, and is so again afterwards.
+    """
+    place[part] = np.arange(part.size)
     lengths = graph.indptr[part + 1] - graph.indptr[part]
-    near = graph.indices[ranges(graph.indptr[part], lengths)]
-    owner = np.repeat(part, lengths)
+    end = place[graph.indices[ranges(graph.indptr[part], lengths)]]
+    begin = np.repeat(np.arange(part.size, dtype=np.int32), lengths)
+    place[part] = -1
+    return begin[end >= 0], end[end >= 0]
+
+
+def separator(edges: Edges, weights: IntArray, coordinates: FloatArray) -> tuple[Mask, Mask]:
+    """Which vertices of a part are on its low side, and which lie between its two sides.
+
+    In a band across the middle of each long axis the lightest separators are found, and of these
+    one is taken whose weight is small relative to the product of both sides.
+    """
     extent = np.ptp(coordinates, axis=0)
-    best = np.inf
-    found = (part[:0], part, part[:0])
+    begin, end = edges
+    count = weights.size
+    total = float(weights.sum())
+    lightest, found = np.inf, None
     for axis in np.flatnonzero(extent >= LONG * extent.max()):
         along = np.argsort(coordinates[:, axis], kind="stable")
-        for share in CUTS:
-            middle = max(1, int(share * part.size))
-            side[part] = 0
-            side[part[along[middle:]]] = 1
-            crossing = (side[owner] == 0) & (side[near] == 1)
-            low, high = np.unique(owner[crossing]), np.unique(near[crossing])
-            between = low if low.size <= high.size else high
-            worth = between.size / (share * (1.0 - share))
-            if worth < best:
-                best = worth
-                side[between] = 2
-                found = (part[side[part] == 0], part[side[part] == 1], between)
-    side[part] = -1
+        first = max(1, int((0.5 - BAND) * count))
+        last = min(count - 1, math.ceil((0.5 + BAND) * count))
+        side = np.empty(count, dtype=np.int8)
+        side[along[:first]], side[along[first:last]], side[along[last:]] = LOW, MIDDLE, HIGH
+        side[begin[(side[begin] == LOW) & (side[end] == HIGH)]] = MIDDLE
+        for low, between in [(side == LOW, side == MIDDLE), *minimum_cuts(edges, side, weights)]:
+            share, weight = weights[low].sum() / total, weights[between].sum() / total
+            both = share * (1.0 - share - weight)
+            worth = weight / both if both > 0.0 else np.inf
+            if found is None or worth < lightest:
+                lightest, found = worth, (low, between)
+    assert found is not None
+    return found
+
+
+def minimum_cuts(
+    edges: Edges, side: NDArray[np.int8], weights: IntArray
+) -> list[tuple[Mask, Mask]]:
+    """The lightest sets of vertices in the middle that part the low side from the high one.
+
+    There are two of them, the nearest to either side; each with the vertices on its low side. They
+    are the minimum cuts of a network whose vertices carry as much as they weigh [3]_.
+    """
+    begin, end = edges
+    middle = np.flatnonzero(side == MIDDLE)
+    size = middle.size
+    number = np.full(side.size, -1, dtype=np.int32)
+    number[middle] = np.arange(size)
+    within = (number[begin] >= 0) & (number[end] >= 0)
+    own = np.arange(size, dtype=np.int32)
+    low, high = (
+        np.unique(number[begin[(number[begin] >= 0) & (side[end] == s)]]) for s in (LOW, HIGH)
+    )
+    source, sink = 2 * size, 2 * size + 1  # the vertex i is entered at 2 i and left at 2 i + 1
+    starts = [2 * number[begin[within]] + 1, 2 * own, np.full(low.size, source), 2 * high + 1]
+    ends = [2 * number[end[within]], 2 * own + 1, 2 * low, np.full(high.size, sink)]
+    most = np.iinfo(np.int32).max // 2
+    free = np.full(low.size + high.size, most)
+    carried = np.concatenate([np.full(np.count_nonzero(within), most), weights[middle], free])
+    network = sparse.csr_array(
+        (carried.astype(np.int32), (np.concatenate(starts), np.concatenate(ends))),
+        shape=(2 * size + 2, 2 * size + 2),
+    )
+    left = sparse.csr_array(network - csgraph.maximum_flow(network, source, sink).flow)
+    left.eliminate_zeros()
+    found = []
+    for residual, root in ((left, source), (sparse.csr_array(left.T), sink)):
+        reached = np.zeros(2 * size + 2, dtype=bool)
+        reached[csgraph.breadth_first_order(residual, root, return_predecessors=False)] = True
+        entered, gone = reached[0:-2:2], reached[1:-2:2]
+        before, between = side == LOW, np.zeros(side.size, dtype=bool)
+        between[middle] = entered != gone
+        before[middle] = gone if root == source else ~entered & ~gone
+        found.append((before, between))
     return found
 
 

@@ -10,7 +10,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from cms.solvers.cholesky import Cholesky, NotPositiveDefiniteError
-from cms.solvers.dissection import dissected, quotient_graph, vertices
+from cms.solvers.dissection import dissected, quotient_graph, separator, vertices
 from cms.solvers.factor import SOLVERS, factorise, pardiso_is_there
 
 THERE = [name for name in SOLVERS if name != "pardiso" or pardiso_is_there()]
@@ -117,3 +117,22 @@ def test_the_fill_of_a_plane_is_that_of_nested_dissection(monkeypatch, side):
     plan = dissected(grid(side, side))
     fill = sum(f.rows * ((f.rows + 1) / 2 + f.border.size) for f in plan.fronts)
     assert fill < 31 / 4 * side**2 * np.log2(side)
+
+
+def test_the_separator_of_a_dumbbell_is_its_neck():
+    """Two squares of 9 x 9 vertices, joined by a bar of two: no lighter set parts them."""
+    bar = {(i, j) for i in range(9, 13) for j in (3, 4)}
+    square = {(i, j) for i in range(9) for j in range(9)}
+    spots = np.array(sorted(square | bar | {(i + 13, j) for i, j in square}))
+    near = np.abs(spots[:, None] - spots[None, :]).sum(axis=2) == 1
+    edges = tuple(np.nonzero(near))
+    low, between = separator(edges, np.ones(len(spots), dtype=int), spots.astype(float))
+    high = ~low & ~between
+    assert between.sum() == 2 and min(low.sum(), high.sum()) >= 81 - 2
+    assert not near[np.ix_(low, high)].any()
+
+
+def test_the_separator_of_a_cube_is_no_larger_than_a_plane():
+    A = grid(11, 11, 11)
+    plan = dissected(A)
+    assert plan.fronts[-1].rows <= 11**2
