@@ -22,6 +22,7 @@ from fem.assembly.constraints import (
 )
 from fem.assembly.load_vectors import InertiaLoads
 from fem.assembly.shells import facet_matrices, facet_rows
+from fem.assembly.solids import cell_rows, solid_matrices
 from fem.assembly.trusses import truss_form, truss_matrices
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import JointWarning, ModelError
@@ -42,32 +43,19 @@ from fem.elements.natural import (
     ground_rows,
     line_rows,
     natural_form,
-    solid_rows,
 )
 from fem.elements.scatter import (
     SparseArray,
     added,
-    block_pattern,
     dense_scatter,
     displacement_of,
     squares,
 )
-from fem.elements.solids import (
-    checked_volumes,
-    gradients_and_volumes,
-    mass_matrices,
-    stiffness_matrices,
-)
 from fem.elements.tapers import along
 from fem.mesh.attachments import PointMass
-from fem.mesh.cells import KINDS, CellKind
 from fem.mesh.pieces import check_joined
-from fem.model.parts import SolidPart
 from fem.model.store import load_structure, save_structure
 from fem.model.structure import AXES, StructureModel
-
-BATCH_BYTES = 1e8
-"""Size of the element matrices that are made at a time."""
 
 
 class LockingWarning(UserWarning):
@@ -266,43 +254,6 @@ def _check_nothing_empty(
     )
 
 
-def solid_matrices(model: StructureModel, numbering: Numbering) -> tuple[SparseArray, SparseArray]:
-    """Stiffness and mass of all solids, for all degrees of freedom."""
-    size = 3 * numbering.count
-    pieces = [
-        (name, part, KINDS[kind], nodes)
-        for name, (part, kinds) in model.solids.items()
-        for kind, nodes in kinds.items()
-    ]
-    if not pieces:
-        return sparse.csr_array((size, size)), sparse.csr_array((size, size))
-    pattern = block_pattern([numbering.translation[p[3]] for p in pieces], numbering.count)
-    stiffness = np.zeros((3, 3, len(pattern.indices)))
-    mass = np.zeros(len(pattern.indices))
-    for (name, part, kind, nodes), places in zip(pieces, pattern.places, strict=True):
-        what = f"{model.mesh.source}: part {name!r}: {kind.name}"
-        for batch in _batches(len(nodes), kind):
-            K, M = cell_matrices(part, kind, model.mesh.points[nodes[batch]], what, batch.start)
-            at = places[batch].ravel()
-            for i, j in np.ndindex(kind.dimension, kind.dimension):
-                np.add.at(stiffness[i, j], at, K[:, :, i, :, j].ravel())
-            np.add.at(mass, at, M.ravel())
-    return pattern.matrix(stiffness), pattern.same_in_all_directions(mass)
-
-
-def cell_rows(model: StructureModel, numbering: Numbering) -> Iterator[Rows]:
-    """Rows of the natural form of all solids, in batches."""
-    for name, (part, kinds) in model.solids.items():
-        for kind, nodes in ((KINDS[each], nodes) for each, nodes in kinds.items()):
-            what = f"{model.mesh.source}: part {name!r}: {kind.name}"
-            for batch in _batches(len(nodes), kind):
-                coordinates = model.mesh.points[nodes[batch]]
-                gradients, weights = weighted_gradients(part, kind, coordinates, what, batch.start)
-                blocks = numbering.translation[nodes[batch]]
-                dofs = 3 * blocks[..., None] + np.arange(kind.dimension)
-                yield solid_rows(gradients, weights, dofs, 3 * numbering.count, part.lame)
-
-
 def attached_rows(model: StructureModel, numbering: Numbering) -> Iterator[Rows]:
     """Rows of the natural form of beams, springs and foundations."""
     size = 3 * numbering.count
@@ -316,43 +267,6 @@ def attached_rows(model: StructureModel, numbering: Numbering) -> Iterator[Rows]
         yield MatrixRows(given, sparse.eye_array(len(given), format="csr"), elongations)
     for matrices, dofs in (*_foundations(model, numbering), *_springs(model, numbering)):
         yield ground_rows(matrices, dofs, size)
-
-
-def _batches(count: int, kind: CellKind) -> Iterator[slice]:
-    values = (kind.node_count * kind.dimension) ** 2 + 9 * len(kind.quadrature[1]) * kind.node_count
-    step = max(int(BATCH_BYTES / (8 * values)), 1)
-    for first in range(0, count, step):
-        yield slice(first, min(first + step, count))
-
-
-def cell_matrices(
-    part: SolidPart, kind: CellKind, coordinates: FloatArray, what: str, first: int = 0
-) -> tuple[FloatArray, FloatArray]:
-    """Stiffness (e, b, d, b, d) and mass for one direction (e, b, b) of cells of one kind.
-
-    Examples
-    --------
-    >>> from fem.model.parts import Material
-    >>> part = SolidPart(Material(1.0, 1.0, 0.0))
-    >>> K, M = cell_matrices(part, KINDS["hexahedron"], KINDS["hexahedron"].nodes[None], "cube")
-    >>> K.shape, round(float(M.sum()), 12)
-    ((1, 8, 3, 8, 3), 1.0)
-    """
-    gradients, weighted = weighted_gradients(part, kind, coordinates, what, first)
-    return (
-        stiffness_matrices(gradients, weighted, part.lame),
-        mass_matrices(kind, weighted, part.material.density),
-    )
-
-
-def weighted_gradients(
-    part: SolidPart, kind: CellKind, coordinates: FloatArray, what: str, first: int
-) -> tuple[FloatArray, FloatArray]:
-    """Gradients (e, q, b, d) at the places of integration and the volumes (e, q) there."""
-    places, weights = kind.quadrature
-    gradients, volumes = gradients_and_volumes(kind, coordinates[..., : kind.dimension], places)
-    weighted = checked_volumes(volumes, coordinates, what, first) * weights
-    return gradients, weighted if part.thickness is None else weighted * part.thickness
 
 
 def attached_matrices(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.base.arrays import FloatArray
+from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
 from fem.mesh.cells import CellKind
 
@@ -35,12 +35,22 @@ def gradients_and_volumes(
         is negative in a cell that is turned inside out.
     """
     _, reference = kind.basis(places)
-    # J[e, q, i, j] = dx_i / dX_j
-    jacobian = np.einsum("ebi,qbj->eqij", coordinates, reference, optimize=True)
+    jacobian = jacobians(coordinates, reference)
     volumes = np.linalg.det(jacobian)
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = adjugate(jacobian) / volumes[..., None, None]
     return np.matmul(reference, inverse), volumes
+
+
+def mapped_volumes(kind: CellKind, coordinates: FloatArray, places: FloatArray) -> FloatArray:
+    """The determinant (e, q) of the mapping alone, see `gradients_and_volumes`."""
+    return np.asarray(np.linalg.det(jacobians(coordinates, kind.basis(places)[1])))
+
+
+def jacobians(coordinates: FloatArray, reference: FloatArray) -> FloatArray:
+    """J[e, q, i, j] = dx_i / dX_j."""
+    found = np.einsum("ebi,qbj->eqij", coordinates, reference, optimize=True)
+    return np.asarray(found, dtype=np.float64)
 
 
 def adjugate(matrices: FloatArray) -> FloatArray:
@@ -55,7 +65,7 @@ def adjugate(matrices: FloatArray) -> FloatArray:
 
 
 def checked_volumes(
-    volumes: FloatArray, coordinates: FloatArray, what: str, first: int = 0
+    volumes: FloatArray, coordinates: FloatArray, what: str, numbers: IntArray
 ) -> FloatArray:
     """Absolute determinants (e, q), or a ModelError for a cell that is folded or flat."""
     sign = np.sign(volumes[:, :1])
@@ -63,8 +73,8 @@ def checked_volumes(
     if len(bad):
         x, y, z = coordinates[bad[0]].mean(axis=0)
         raise ModelError(
-            f"{what}: cell {first + bad[0]} of the part, at ({x:.6g}, {y:.6g}, {z:.6g}), is flat or"
-            " folded (its mapping has no positive volume everywhere)"
+            f"{what}: cell {numbers[bad[0]]} of the part, at ({x:.6g}, {y:.6g}, {z:.6g}), is flat"
+            " or folded (its mapping has no positive volume everywhere)"
         )
     return np.asarray(np.abs(volumes), dtype=np.float64)
 

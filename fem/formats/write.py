@@ -16,10 +16,15 @@ from fem.base.errors import ModelError, quoted
 from fem.base.files import plain_write_errors
 from fem.formats.abaqus.types import ORDERS, SOLIDS
 from fem.formats.ignored import SET_PREFIX
+from fem.mesh.cells import KINDS
 from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.structure_mesh import StructureMesh
 
-ABAQUS_TYPES = {kind: name for name, kind in SOLIDS.items() if not name.startswith("CPE")}
+ABAQUS_TYPES = {
+    kind: name + ("R" if KINDS[kind].reducible else "")
+    for name, kind in SOLIDS.items()
+    if not name.startswith("CPE")
+}
 ABAQUS_TYPES |= {"line": "B31", "line3": "B32"}
 
 

@@ -207,6 +207,17 @@ class CellKind:
         places, weights = get_quadrature(self.element, self.integration_order)
         return np.ascontiguousarray(places.T), weights
 
+    @property
+    def reducible(self) -> bool:
+        """Whether cells of the kind may be integrated at 2 places in each direction only."""
+        return self.name in ("quad8", "hexahedron20")
+
+    @cached_property
+    def reduced_quadrature(self) -> tuple[FloatArray, FloatArray]:
+        """Gauss's 2 places in each direction (q, d) and their weights (q,)."""
+        places, weights = get_quadrature(self.element, 3)
+        return np.ascontiguousarray(places.T), weights
+
     def basis(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Shape functions and their reference gradients, (q, b) and (q, b, d), at places (q, d)."""
         at = np.ascontiguousarray(places.T)

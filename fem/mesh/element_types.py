@@ -41,6 +41,20 @@ def family(element_type: str) -> str:
     return next(found, "")
 
 
+def integration(element_type: str) -> str | None:
+    """How Abaqus and CalculiX integrate a solid of a type; None for a type of neither.
+
+    Examples
+    --------
+    >>> integration("C3D20RH"), integration("CPS8"), integration("CHEXA")
+    ('reduced', 'full', None)
+    """
+    found = re.fullmatch(r"(?:C3D|CPS|CPE)\d+([A-Z]*)", element_type.upper())
+    if found is None:
+        return None
+    return "reduced" if "R" in found[1] else "full"
+
+
 def check_family(owner: str, part: object, kinds: Mapping[str, int]) -> None:
     """Refuse a part whose cells the file says to be of another family.
 

@@ -13,6 +13,7 @@ from fem.model.sections import CircularSection, CrossSection, SectionRun, Tapere
 
 THEORIES = ("euler-bernoulli", "timoshenko")
 PLANES = ("stress", "strain")
+INTEGRATIONS = ("full", "reduced")
 SHEAR_FACTOR = 5.0 / 6.0
 
 
@@ -153,6 +154,10 @@ class SolidPart:
         the x-y plane, "stress" (a sheet) or "strain" (a slice of a long body).
     thickness
         In m, of a plane part.
+    integration
+        How ``quad8`` and ``hexahedron20`` are integrated: "reduced", at 2 places in each
+        direction, or "full", at 3, which is too stiff where a thin part is curved. By default as
+        the file's types of elements say (``C3D20R``, ``C3D20``), else reduced.
 
     Examples
     --------
@@ -164,11 +169,17 @@ class SolidPart:
     material: Material
     plane: str | None = None
     thickness: float | None = None
+    integration: str | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.material, Material):
             raise ModelError(f"part: material must be a Material, not {self.material!r}")
         self.material.poissons_ratio_for("solid part")
+        if self.integration is not None and self.integration not in INTEGRATIONS:
+            raise ModelError(
+                f"solid part: integration must be one of {quoted(INTEGRATIONS)}, not"
+                f" {self.integration!r}"
+            )
         if self.plane is None and self.thickness is None:
             return
         if self.plane not in PLANES:

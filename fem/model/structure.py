@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError, by_name, listed, quoted
 from fem.mesh.attachments import Attachments, Coupling, PointMass, PointSpring
-from fem.mesh.cells import KINDS, SPANS, all_facets, facet_keys
+from fem.mesh.cells import KINDS, SPANS, CellKind, all_facets, facet_keys
 from fem.mesh.doubled import check_no_doubles
-from fem.mesh.element_types import check_family, counted
+from fem.mesh.element_types import check_family, counted, integration
 from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.lost import check_nothing_lost
 from fem.mesh.shell_centres import with_centres
@@ -54,6 +55,32 @@ TABLES: tuple[tuple[str, object, str], ...] = (
     ("parts", Part, "BeamPart, TrussPart, SolidPart and ShellPart"),
     ("interfaces", Interface, "Interface"),
 )
+
+
+@dataclass(frozen=True, eq=False)
+class SolidCells:
+    """Cells of one kind in one solid part that are integrated alike.
+
+    Parameters
+    ----------
+    name, part
+        The part.
+    kind
+        The kind of cell.
+    nodes
+        Of the cells, shape (e, b).
+    reduced
+        Whether they are integrated at 2 places in each direction.
+    numbers
+        Which cells of the kind in the part they are, shape (e,).
+    """
+
+    name: str
+    part: SolidPart
+    kind: CellKind
+    nodes: IntArray
+    reduced: bool
+    numbers: IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +196,29 @@ class StructureModel:
         }
 
     @cached_property
+    def solid_cells(self) -> list[SolidCells]:
+        """The cells of solid parts by kind and by how they are integrated."""
+        found = []
+        for name, (part, kinds) in self.solids.items():
+            for kind, nodes in kinds.items():
+                reduced = self._reduced(part, kind, self.mesh.part(name)[kind])
+                for way in np.unique(reduced):
+                    at = np.flatnonzero(reduced == way)
+                    found.append(SolidCells(name, part, KINDS[kind], nodes[at], bool(way), at))
+        return found
+
+    def _reduced(self, part: SolidPart, kind: str, cells: IntArray) -> npt.NDArray[np.bool_]:
+        """Which cells of a kind in a part are integrated at fewer places."""
+        if not KINDS[kind].reducible:
+            return np.zeros(len(cells), dtype=np.bool_)
+        reduced = np.full(len(cells), part.integration != "full")
+        if part.integration is None:
+            types = self.mesh.element_types.items()
+            full = [at[kind] for t, at in types if integration(t) == "full" and kind in at]
+            reduced &= ~np.isin(cells, np.concatenate([[], *full]))
+        return reduced
+
+    @cached_property
     def attached(self) -> Attachments:
         """Masses, links, couplings and equations: of the mesh's file, and the model's own."""
         own = Attachments(self.point_masses, couplings=self.couplings)
@@ -241,6 +291,12 @@ class StructureModel:
                 raise ModelError(
                     f"{mesh.source}: part {name!r} is a {type(part).__name__} and needs cells out"
                     f" of {quoted(sorted(wanted))}, but has {quoted(wrong)}"
+                )
+            reduced = isinstance(part, SolidPart) and part.integration == "reduced"
+            if reduced and not any(KINDS[kind].reducible for kind in group):
+                raise ModelError(
+                    f"{mesh.source}: part {name!r} has integration 'reduced', which is for quad8"
+                    f" and hexahedron20, but its cells are {quoted(group)}"
                 )
             for kind, cells in group.items():
                 owners[kind][cells] += 1

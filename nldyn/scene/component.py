@@ -181,7 +181,7 @@ def _truss(table: PartTable) -> fem.TrussPart:
 def _part(table: PartTable) -> fem.BeamPart | fem.TrussPart | fem.SolidPart | fem.ShellPart:
     material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
     if table.kind == "solid":
-        return fem.SolidPart(material, table.plane, table.thickness)
+        return fem.SolidPart(material, table.plane, table.thickness, table.integration)
     if table.kind == "shell":
         assert table.thickness is not None and not isinstance(table.offset, list)
         return fem.ShellPart(material, table.thickness, table.offset or 0.0)

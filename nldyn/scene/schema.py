@@ -133,6 +133,10 @@ class PartTable(Table):
     """Of a solid of triangles or quadrilaterals: `"stress"` or `"strain"`."""
     thickness: Positive | None = None
     """[m] Of a solid in the plane, or of a shell."""
+    integration: Literal["full", "reduced"] | None = None
+    """Of a solid of `quad8` or `hexahedron20`: `"reduced"`, at 2 places in each direction, or
+    `"full"`, at 3, which is too stiff where a thin part is curved. If left out as the file's types
+    of elements say (`C3D20R`, `C3D20`), else reduced."""
     width: Positive | None = None
     """[m] Width of a rectangle, normal to the plane of the frame."""
     height: Positive | None = None
@@ -189,13 +193,15 @@ class PartTable(Table):
     @model_validator(mode="after")
     def _what_it_is(self) -> PartTable:
         if self.kind == "beam":
-            _refuse(self, ("plane", "thickness"), "a beam; use kind 'solid' or 'shell'")
+            _refuse(
+                self, ("plane", "thickness", "integration"), "a beam; use kind 'solid' or 'shell'"
+            )
             if isinstance(self.offset, float):
                 raise ValueError("needs two numbers in 'offset' (along the height and the width)")
             return self._one_section()
         own = {
             "truss": ("area",),
-            "solid": ("plane", "thickness"),
+            "solid": ("plane", "thickness", "integration"),
             "shell": ("thickness", "offset"),
         }[self.kind]
         common = ("kind", "youngs_modulus", "density", "poissons_ratio")

@@ -210,7 +210,7 @@ def test_a_rod_rings_as_the_wave_equation_says(kind):
 
 @pytest.fixture(scope="module")
 def converged_bar():
-    mesh = fem.box_mesh("bar", LENGTHS, (20, 4, 4))
+    mesh = fem.box_mesh("bar", LENGTHS, (20, 4, 4), kind="hexahedron27")
     return lowest_hz(body(mesh, supports=[fem.Support("x0", CLAMP)]), 4)
 
 
