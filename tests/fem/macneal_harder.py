@@ -8,7 +8,9 @@ of the paper, and the finest of those that it divides; it counts spaces between 
 cells of second order have two.
 """
 
+import itertools
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -260,36 +262,79 @@ def cylinder(kind, poisson):
     return share @ np.einsum("ni,ni->n", moved, outwards)
 
 
-STRAIGHT = "straight beam"
-PROBLEMS = [
-    (f"{STRAIGHT}, in its plane", lambda k: straight(k).along("x1", 1), 0.1081),
-    (f"{STRAIGHT}, out of its plane", lambda k: straight(k).along("x1", 2), 0.4321),
-    (f"{STRAIGHT}, twisted", twisting, 0.03208),
-    ("curved beam, in its plane", lambda k: curved(k).along("x1", 0), 0.08734),
-    ("curved beam, out of its plane", lambda k: curved(k).along("x1", 2), 0.5022),
-    ("twisted beam, t = 0.32, along the width", lambda k: twisted(k, 0.32).along("x1", 2), 5.424e-3),
-    ("twisted beam, t = 0.32, across it", lambda k: twisted(k, 0.32).along("x1", 1), 1.754e-3),
-    ("twisted beam, t = 0.0032, along the width", lambda k: twisted(k, 0.0032).along("x1", 2), 5256),
-    ("twisted beam, t = 0.0032, across it", lambda k: twisted(k, 0.0032).along("x1", 1), 1294),
-    ("square plate, simply supported, pressure", lambda k: plate(k, 2, "simple", "pressure"), 4.062e-6),
-    ("square plate, simply supported, force", lambda k: plate(k, 2, "simple", "force"), 11.60e-6),
-    ("square plate, clamped, pressure", lambda k: plate(k, 2, "clamped", "pressure"), 1.26e-6),
-    ("square plate, clamped, force", lambda k: plate(k, 2, "clamped", "force"), 5.60e-6),
-    ("long plate, simply supported, pressure", lambda k: plate(k, 10, "simple", "pressure"), 12.97e-6),
-    ("long plate, simply supported, force", lambda k: plate(k, 10, "simple", "force"), 16.96e-6),
-    ("long plate, clamped, pressure", lambda k: plate(k, 10, "clamped", "pressure"), 2.56e-6),
-    ("long plate, clamped, force", lambda k: plate(k, 10, "clamped", "force"), 7.23e-6),
-    ("Scordelis and Lo's roof", roof, 0.3024),
-    ("hemisphere with a hole", hemisphere, 0.0940),
+@dataclass(frozen=True)
+class Problem:
+    """A deflection of any kind of cells, and the published one."""
+
+    name: str
+    deflection: Callable[[str], float]
+    published: float
+
+
+def ends(name, beam, axis, published):
+    return Problem(name, lambda kind: beam(kind).along("x1", axis), published)
+
+
+def plates(name, length, published):
+    cases = itertools.product(("simple", "clamped"), ("pressure", "force"))
+    words = {"simple": "simply supported", "clamped": "clamped"}
+    return [
+        Problem(
+            f"{name} plate, {words[held]}, {load}",
+            lambda kind, held=held, load=load: plate(kind, length, held, load),
+            value * 1e-6,
+        )
+        for (held, load), value in zip(cases, published, strict=True)
+    ]
+
+
+def leaning(shape):
+    return lambda kind: straight(kind, shape)
+
+
+def twisted_of(thickness):
+    return lambda kind: twisted(kind, thickness)
+
+
+REGULAR = [
+    ends("straight beam, in its plane", straight, 1, 0.1081),
+    ends("straight beam, out of its plane", straight, 2, 0.4321),
+    Problem("straight beam, twist", twisting, 0.03208),
+    ends("curved beam, in its plane", curved, 0, 0.08734),
+    ends("curved beam, out of its plane", curved, 2, 0.5022),
+    ends("twisted beam, t = 0.32, along the width", twisted_of(0.32), 2, 5.424e-3),
+    ends("twisted beam, t = 0.32, across it", twisted_of(0.32), 1, 1.754e-3),
+    ends("twisted beam, t = 0.0032, along the width", twisted_of(0.0032), 2, 5256.0),
+    ends("twisted beam, t = 0.0032, across it", twisted_of(0.0032), 1, 1294.0),
+    *plates("square", 2, (4.062, 11.60, 1.26, 5.60)),
+    *plates("long", 10, (12.97, 16.96, 2.56, 7.23)),
+    Problem("Scordelis and Lo's roof", roof, 0.3024),
+    Problem("hemisphere with a hole", hemisphere, 0.0940),
 ]
+"""On the regular meshes."""
 LEANING = [
-    (f"{STRAIGHT}, in its plane, {s}", lambda k, s=s: straight(k, s).along("x1", 1), 0.1081)
-    for s in ("trapezoids", "parallelograms")
-] + [
-    (f"{STRAIGHT}, out of its plane, {s}", lambda k, s=s: straight(k, s).along("x1", 2), 0.4321)
-    for s in ("trapezoids", "parallelograms")
+    ends(f"straight beam of {shape}, {way}", leaning(shape), axis, published)
+    for shape in ("trapezoids", "parallelograms")
+    for way, axis, published in (("in its plane", 1, 0.1081), ("out of its plane", 2, 0.4321))
 ]
+"""On the distorted ones."""
 CYLINDER = [
-    (f"thick cylinder, nu = {nu}", lambda k, nu=nu: cylinder(k, nu), published)
-    for nu, published in ((0.49, 5.0399e-3), (0.499, 5.0602e-3), (0.4999, 5.0623e-3))
+    Problem(
+        f"thick cylinder, Poisson's ratio {nu}",
+        lambda kind, nu=nu: cylinder(kind, nu),
+        value * 1e-3,
+    )
+    for nu, value in ((0.49, 5.0399), (0.499, 5.0602), (0.4999, 5.0623))
 ]
+"""Of solids only."""
+
+
+def problems(kind):
+    """Those of a kind of cells."""
+    return [*REGULAR, *LEANING, *(CYLINDER if kind not in SHELLS else [])]
+
+
+@cache
+def ratio(problem, kind):
+    """Computed over published deflection."""
+    return problem.deflection(kind) / problem.published
