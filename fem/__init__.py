@@ -17,7 +17,9 @@ from fem.mesh.attachments import (
     LinearEquation,
     Link,
     PointMass,
+    PointMatrix,
     PointSpring,
+    Support,
 )
 from fem.mesh.frame_mesh import FrameMesh, frame_mesh
 from fem.mesh.pieces import Pieces, pieces_of
@@ -25,17 +27,19 @@ from fem.mesh.places import node_at, nodes_inside
 from fem.mesh.refine import refined
 from fem.mesh.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
 from fem.model.calibrate import Calibration, calibrate
+from fem.model.described import parts_of
 from fem.model.frame import FrameModel
 from fem.model.parts import BeamPart, Material, ShellPart, SolidPart, TrussPart
 from fem.model.sections import (
     CircularSection,
     CrossSection,
+    LinearSection,
     RectangularSection,
     Section,
     TaperedSection,
 )
 from fem.model.structure import StructureModel, symmetry
-from fem.model.supports import Foundation, Hinge, Interface, Support
+from fem.model.supports import Foundation, Hinge, Interface
 
 __all__ = [
     "Attachments",
@@ -54,6 +58,7 @@ __all__ = [
     "JointWarning",
     "LeftOut",
     "LinearEquation",
+    "LinearSection",
     "Link",
     "LockingWarning",
     "MassProperties",
@@ -61,6 +66,7 @@ __all__ = [
     "ModelError",
     "Pieces",
     "PointMass",
+    "PointMatrix",
     "PointSpring",
     "RectangularSection",
     "Section",
@@ -82,6 +88,7 @@ __all__ = [
     "mass_properties",
     "node_at",
     "nodes_inside",
+    "parts_of",
     "pieces_of",
     "read_abaqus",
     "read_mesh",

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FLOORS = {
     "nldyn": "app paper report plot|scene longterm|reduction|io search curves branches bifurcations"
     " orbits flow runtime|system base",
-    "fem": "render assembly checks elements formats|model mesh base",
+    "fem": "render assembly checks elements formats model mesh base",
     "cms": "checks reduction solvers|files component base",
 }
 FLOOR = {

@@ -13,10 +13,9 @@ from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
 from fem.elements.beams import cross_matrix
 from fem.elements.scatter import SparseArray, dense_scatter
-from fem.mesh.attachments import Coupling
+from fem.mesh.attachments import Coupling, Support
 from fem.mesh.cells import KINDS, measures
 from fem.model.structure import AXES, IN_PLANE, StructureModel, axis_index
-from fem.model.supports import Support
 
 CANCELLED = 1e-12  # of the largest: a coefficient that is rounding
 ALIGNED = 1e10  # condition of a support's moments of area, from which its nodes lie on a line
@@ -94,10 +93,13 @@ def _number_attached(
         for point, way in zip(link.points, link.directions or ("x", "x"), strict=True)
     ]
     used += [(p, way.startswith("rotation")) for e in brought.equations for p, way, _ in e.terms]
+    used += [(p, way.startswith("rotation")) for m in brought.matrices for p, way in m.terms]
     for point, turning in used:
         node = model.mesh.node(point)
         moves[node] = True
         turns[node] |= turning and not on_parts[node]
+    for name in brought.turning:
+        turns[model.mesh.nodes(name)] = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +133,11 @@ class Constraints:
         part.eliminate_zeros()
         part.sort_indices()
         return part
+
+    def holding(self, more: BoolArray) -> Constraints:
+        """The same with some of the free ones held, too, given by a mask (N,)."""
+        relation = sparse.csr_array(self.relation[:, ~more])
+        return Constraints(self.free[~more], self.dependent, relation, self.size)
 
     @cached_property
     def transformation(self) -> SparseArray:
@@ -301,7 +308,7 @@ def _held(model: StructureModel, numbering: Numbering) -> IntArray:
         out = [axis_index(name) for name in AXES if name not in IN_PLANE]
         held.append(numbering.dofs(np.arange(len(model.mesh.points)))[:, out].ravel())
         held += [3 * numbering.hinged, 3 * numbering.hinged + 1]
-    for support in model.supports:
+    for support in model.attached.supports:
         nodes = model.mesh.nodes(support.point)
         columns = [axis_index(direction) for direction in support.directions]
         dofs = numbering.dofs(nodes)[:, columns]

@@ -21,6 +21,7 @@ from fem.assembly.constraints import (
     rigid_motions,
 )
 from fem.assembly.load_vectors import InertiaLoads
+from fem.assembly.loose import loose_directions
 from fem.assembly.shells import facet_matrices, facet_rows
 from fem.assembly.solids import cell_rows, solid_matrices
 from fem.assembly.trusses import truss_form, truss_matrices
@@ -34,7 +35,14 @@ from fem.checks.mechanisms import joint_warnings, mechanism_warnings
 from fem.checks.neighbours import check_not_folded
 from fem.checks.overlapping import overlap_warnings
 from fem.checks.unlikely import UnlikelyWarning, check_masses_carried, unlikely
-from fem.elements.beams import cross_matrix, element_matrices, element_rows, local_axes, to_nodes
+from fem.elements.beams import (
+    cross_matrix,
+    element_matrices,
+    element_rows,
+    local_axes,
+    run,
+    to_nodes,
+)
 from fem.elements.links import link_rows
 from fem.elements.natural import (
     MatrixRows,
@@ -180,8 +188,7 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     slits = check_joined(model)
     check_conforming(model)
     check_not_folded(model)
-    told = (*joint_warnings(model), *mechanism_warnings(model), *slits)
-    for text in told:
+    for text in (*joint_warnings(model), *mechanism_warnings(model), *slits):
         warnings.warn(text, JointWarning, stacklevel=3)
     check_masses_carried(model)
     for text in unlikely(model):
@@ -199,6 +206,14 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     K = constraints.reduced(stiffness)
     del stiffness
     M = constraints.reduced(mass)
+    loose = loose_directions(model, numbering, constraints, K)
+    if loose.any():
+        text = (
+            f"{model.mesh.source}: {loose.sum()} directions of nodes that nothing resists are held"
+        )
+        warnings.warn(text, JointWarning, stacklevel=3)
+        constraints = constraints.holding(loose)
+        K, M = (sparse.csr_array(matrix[~loose][:, ~loose]) for matrix in (K, M))
     _check_nothing_empty(K, M, model, numbering, constraints)
     interfaces = _interface_vectors(model, numbering, constraints)
     damping = _damping(model, numbering, constraints)
@@ -265,7 +280,8 @@ def attached_rows(model: StructureModel, numbering: Numbering) -> Iterator[Rows]
     elongations, given, _ = _link_rows(model, numbering)
     if given.any():
         yield MatrixRows(given, sparse.eye_array(len(given), format="csr"), elongations)
-    for matrices, dofs in (*_foundations(model, numbering), *_springs(model, numbering)):
+    springs = *_springs(model, numbering), *_matrices(model, numbering, "stiffness")
+    for matrices, dofs in (*_foundations(model, numbering), *springs):
         yield ground_rows(matrices, dofs, size)
 
 
@@ -285,8 +301,11 @@ def attached_matrices(
         mass = added(mass, dense_scatter(M, dofs, size))
     elongations, given, _ = _link_rows(model, numbering)
     stiffness = added(stiffness, squares(elongations, given))
-    for matrices, dofs in (*_foundations(model, numbering), *_springs(model, numbering)):
+    springs = *_springs(model, numbering), *_matrices(model, numbering, "stiffness")
+    for matrices, dofs in (*_foundations(model, numbering), *springs):
         stiffness = added(stiffness, dense_scatter(matrices, dofs, size))
+    for matrices, dofs in _matrices(model, numbering, "mass"):
+        mass = added(mass, dense_scatter(matrices, dofs, size))
     for lump in model.attached.point_masses:
         matrix, dofs = _lumped(model, numbering, lump)
         mass = added(mass, dense_scatter(matrix, dofs, size))
@@ -309,6 +328,17 @@ def _springs(model: StructureModel, numbering: Numbering) -> Iterator[tuple[Floa
         yield np.array([[[spring.stiffness]]]), np.array([[dof]])
 
 
+def _matrices(
+    model: StructureModel, numbering: Numbering, kind: str
+) -> Iterator[tuple[FloatArray, IntArray]]:
+    """The matrices of one kind between directions of points, (1, k, k) and (1, k)."""
+    for matrix in model.attached.matrices:
+        rows = getattr(matrix, kind)
+        if rows:
+            dofs = [point_dof(model, numbering, point, way) for point, way in matrix.terms]
+            yield np.array([rows]), np.array([dofs])
+
+
 def _link_rows(
     model: StructureModel, numbering: Numbering
 ) -> tuple[SparseArray, FloatArray, FloatArray]:
@@ -320,9 +350,12 @@ def _link_rows(
 def _damping(
     model: StructureModel, numbering: Numbering, constraints: Constraints
 ) -> SparseArray | None:
-    """Damping matrix of the links, if one has any."""
+    """Damping matrix of the links and of matrices, if one has any."""
     elongations, _, damping = _link_rows(model, numbering)
-    return constraints.reduced(squares(elongations, damping)) if damping.any() else None
+    found = squares(elongations, damping)
+    for matrices, dofs in _matrices(model, numbering, "damping"):
+        found = added(found, dense_scatter(matrices, dofs, 3 * numbering.count))
+    return constraints.reduced(found) if found.count_nonzero() else None
 
 
 def _lumped(
@@ -378,9 +411,10 @@ def _beam_foundation(
         on = inside[lines].all(axis=1)
         if on.any():
             ends = model.mesh.points[lines[on]]
-            spans = ends[:, 1] - ends[:, 0]
             what = f"{model.mesh.source}: part {name!r}"
+            spans = ends[:, 1] - ends[:, 0]
             axes = local_axes(part, spans, what)
+            spans = run(part, spans, what)
             shapes = beam_shapes(np.linalg.norm(spans, axis=1))
             # displacement of the axis in x, y, z: (e, q, 3, 12)
             N = np.einsum("eji,eqjk,ekl->eqil", axes, shapes, to_nodes(part, axes), optimize=True)

@@ -121,7 +121,7 @@ def beams_that_turn(model: StructureModel) -> Iterator[tuple[list[str], str]]:
         if coupling.kind == "rigid" and len(coupling.directions) == 3:
             pinned[model.mesh.nodes(coupling.face)] = False
     turns = {"rotation_z"} if model.is_plane else {f"rotation_{axis}" for axis in "xyz"}
-    for support in model.supports:
+    for support in model.attached.supports:
         if turns <= {AXES[axis_index(direction)] for direction in support.directions}:
             pinned[model.mesh.nodes(support.point)] = False
     for name, (_, ends) in model.beams.items():
@@ -248,14 +248,17 @@ def mechanism_warnings(model: StructureModel) -> Iterator[str]:
         held[model.mesh.nodes(coupling.face)] = held[model.mesh.node(coupling.point)] = 1
     for foundation in model.foundations:
         held[model.mesh.nodes(foundation.face)] |= np.array(foundation.stiffness) > 0.0
-    ties = [(support.point, d) for support in model.supports for d in support.directions]
+    ties = [(support.point, d) for support in model.attached.supports for d in support.directions]
     ties += [(spring.point, spring.direction) for spring in model.springs]
     brought = model.attached
     ties += [(p, d) for link in brought.links for p, d, _ in link_terms(model.mesh, link)]
     ties += [(p, d) for equation in brought.equations for p, d, _ in equation.terms]
+    ties += [term for matrix in brought.matrices for term in matrix.terms]
     for point, direction in ties:
         if axis_index(direction) < 3:
             held[model.mesh.nodes(point), axis_index(direction)] = 1
+    for name in brought.loose:
+        held[model.mesh.nodes(name)] = 1
     trusses = [nodes for _, kinds in model.trusses.values() for nodes in kinds.values()]
     dimension = 2 if model.is_plane else 3
     yield from loose_sentences(model.mesh, loose_nodes(model.mesh.points, trusses, held, dimension))

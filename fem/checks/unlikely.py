@@ -81,7 +81,7 @@ def _upon_each_other(model: FrameModel | StructureModel) -> Iterator[tuple[int, 
     """
     points = model.mesh.points
     beams = list(_beams(model).values())
-    lines = [ends for part, ends in beams if not any(part.offset)]
+    lines = [ends for part, ends in beams if not any(part.offset) and part.end_offsets is None]
     if lines:
         ends = np.concatenate(lines)
         ends = np.concatenate([ends, ends[:, ::-1]])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -217,14 +218,40 @@ def _composed(
     return stiffness, mass
 
 
+def run(part: BeamPart, spans: FloatArray, what: str) -> FloatArray:
+    """Spans (e, 3) of the axes of lines with these spans between their nodes."""
+    if part.end_offsets is None:
+        return spans
+    first, second = np.moveaxis(_for_lines(part.end_offsets, 2, len(spans), what), 1, 0)
+    found = np.asarray(spans + second - first, dtype=np.float64)
+    short = np.flatnonzero(~(np.linalg.norm(found, axis=1) > 0.0))
+    if len(short):
+        raise ModelError(f"{what}: line {short[0]} has no length between its end offsets")
+    return found
+
+
+def _for_lines(values: object, rank: int, count: int, what: str) -> FloatArray:
+    """Numbers of one rank for each of so many lines, if they are not given for each."""
+    given = np.array(values, dtype=np.float64)
+    if given.ndim == rank:
+        return np.asarray(np.broadcast_to(given, (count, *given.shape)))
+    if len(given) != count:
+        raise ModelError(
+            f"{what}: it has {count} lines, but orientations or offsets of {len(given)}; the mesh"
+            " was changed after they were given"
+        )
+    return given
+
+
 def local_axes(part: BeamPart, spans: FloatArray, what: str) -> FloatArray:
-    """Unit vectors x, y, z of the elements as rows, shape (e, 3, 3), from their spans (e, 3).
+    """Unit vectors x, y, z of the elements as rows, (e, 3, 3), from their nodes' spans (e, 3).
 
     Raises
     ------
     ModelError
         If the orientation lies along an element, or is missing for one along z.
     """
+    spans = run(part, spans, what)
     x = spans / np.linalg.norm(spans, axis=1)[:, None]
     if part.orientation is None:
         z = UPRIGHT - x * x[:, 2:]
@@ -234,11 +261,14 @@ def local_axes(part: BeamPart, spans: FloatArray, what: str) -> FloatArray:
             z[np.linalg.norm(z, axis=1) < ALONG] = (1.0, 0.0, 0.0)  # round: any direction will do
         fault = "runs along z, so it needs an orientation (the direction of the section's height)"
     else:
-        z = np.cross(x, np.asarray(part.orientation) / np.linalg.norm(part.orientation))
+        height = _for_lines(part.orientation, 1, len(spans), what)
+        z = np.cross(x, height / np.linalg.norm(height, axis=1)[:, None])
         fault = f"runs along its orientation {part.orientation}"
     size = np.linalg.norm(z, axis=1)
     along = np.flatnonzero(size < ALONG)
     if len(along):
+        if np.ndim(part.orientation) == 2:
+            fault = f"runs along its orientation {part.orientation[along[0]]}"
         raise ModelError(f"{what}: line {along[0]} {fault}")
     z = z / size[:, None]
     return np.stack([x, np.cross(z, x), z], axis=1)
@@ -248,14 +278,17 @@ def to_nodes(part: BeamPart, axes: FloatArray) -> FloatArray:
     """The matrices (e, 12, 12) from the nodes' displacements to those of the axis, in local axes.
 
     The nodes have (ux, uy, uz) and the rotations about x, y and z at the first end, then at the
-    second; the axis lies off the line between them by the part's offset.
+    second; the axis lies off the line between them by the part's offsets.
     """
     offset = np.einsum("i,eij->ej", np.array([0.0, *part.offset]), axes)
+    ends = np.zeros((len(axes), 2, 3))
+    if part.end_offsets is not None:
+        ends = _for_lines(part.end_offsets, 2, len(axes), "part")
     T = np.zeros((len(axes), 12, 12))
-    for first in (0, 6):
+    for end, first in enumerate((0, 6)):
         T[:, first : first + 3, first : first + 3] = axes
         T[:, first + 3 : first + 6, first + 3 : first + 6] = axes
-        T[:, first : first + 3, first + 3 : first + 6] = axes @ -cross_matrix(offset)
+        T[:, first : first + 3, first + 3 : first + 6] = axes @ -cross_matrix(offset + ends[:, end])
     return T
 
 
@@ -268,19 +301,77 @@ def cross_matrix(vectors: FloatArray) -> FloatArray:
     )
 
 
+def release(part: BeamPart, count: int, what: str) -> FloatArray | None:
+    """Which local displacements (e, 12) of both ends are not joined to the nodes, as 1 and 0."""
+    if part.released is None:
+        return None
+    given = part.released
+    each = [given] * count if not given or not _nested(given) else list(given)
+    if len(each) != count:
+        raise ModelError(f"{what}: it has {count} lines, but released directions of {len(each)}")
+    found = np.zeros((count, 12))
+    for row, ends in enumerate(each):
+        for end, directions in enumerate(ends):
+            found[row, [6 * end + direction for direction in directions]] = 1.0
+    return found
+
+
+def _nested(released: Any) -> bool:
+    """Whether released directions are given for each line, and not once for all."""
+    return any(isinstance(one, tuple) for each in released for one in each)
+
+
+def without_released(rows: FloatArray, stiffness: FloatArray, released: FloatArray) -> FloatArray:
+    """The matrices (e, 12, 12) that give released displacements their values of least energy.
+
+    Where an end that is released costs no energy at all, it stays.
+    """
+    K = np.einsum("eri,er,erj->eij", rows, stiffness, rows, optimize=True)
+    free = released[:, :, None] * released[:, None, :]
+    scale = np.abs(K).max(axis=(1, 2), keepdims=True)
+    inverse = np.linalg.pinv(K * free / scale, rcond=1e-12, hermitian=True) / scale
+    kept = 1.0 - released
+    found = -(released[:, :, None] * (inverse @ (K * kept[:, None, :])))
+    found[:, range(12), range(12)] += kept
+    return np.asarray(found, dtype=np.float64)
+
+
+def local_rows(
+    part: BeamPart, spans: FloatArray, what: str
+) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """Rows (e, 8, 12) for both ends in local axes, stiffness (e, 8), and what releases leave.
+
+    The last are the matrices (e, 12, 12) of `without_released`, which the rows hold already.
+    """
+    relative, stiffness = spatial_rows(part, np.linalg.norm(run(part, spans, what), axis=1), what)
+    rows = np.zeros((len(spans), 8, 12))
+    rows[:, :, :3], rows[:, :, 6:9] = -relative[:, :, :3], relative[:, :, :3]
+    rows[:, :, 3:6], rows[:, :, 9:] = relative[:, :, 3:6], relative[:, :, 6:]
+    released = release(part, len(spans), what)
+    if released is None:
+        return rows, stiffness, None
+    left = without_released(rows, stiffness, released)
+    return rows @ left, stiffness, left
+
+
 def element_rows(part: BeamPart, spans: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
     """Rows (e, 8, 9) of the natural form for the nodes' displacements, and stiffness (e, 8)."""
-    rows, stiffness = spatial_rows(part, np.linalg.norm(spans, axis=1), what)
+    rows, stiffness, _ = local_rows(part, spans, what)
     T = to_nodes(part, local_axes(part, spans, what))
-    relative = np.zeros((len(spans), 9, 9))
-    relative[:, :3, :3] = T[:, :3, :3]
-    relative[:, :3, 3:6], relative[:, :3, 6:] = -T[:, :3, 3:6], T[:, :3, 3:6]
-    relative[:, 3:6, 3:6] = relative[:, 6:, 6:] = T[:, 3:6, 3:6]
+    # that all nodes move alike deforms nothing: only their difference counts
+    relative = np.zeros((len(spans), 12, 9))
+    relative[:, :6, 3:6], relative[:, 6:, 6:] = T[:, :6, 3:6], T[:, 6:, 9:]
+    relative[:, 6:, :3] = T[:, 6:, 6:9]
     return rows @ relative, stiffness
 
 
 def element_matrices(part: BeamPart, spans: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
     """Stiffness and mass (e, 12, 12) of beams in space for their nodes' displacements."""
     T = to_nodes(part, local_axes(part, spans, what))
-    stiffness, mass = spatial_matrices(part, np.linalg.norm(spans, axis=1), what)
+    lengths = np.linalg.norm(run(part, spans, what), axis=1)
+    stiffness, mass = spatial_matrices(part, lengths, what)
+    if part.released is not None:
+        left = local_rows(part, spans, what)[2]
+        assert left is not None
+        T = left @ T
     return congruent(stiffness, T), congruent(mass, T)

@@ -13,7 +13,7 @@ from fem.elements.straight_beams import PLACES
 from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.structure_mesh import StructureMesh
 from fem.model.parts import TrussPart
-from fem.model.sections import SectionRun, TaperedSection
+from fem.model.sections import LinearSection, SectionRun, TaperedSection
 
 BEYOND = 1e-6
 """Share of the way by which nodes may lie before the start or behind the end of a taper."""
@@ -46,7 +46,11 @@ def along(
     ModelError
         If there are no such points, or a line reaches beyond them.
     """
-    if isinstance(part, TrussPart) or not isinstance(part.section, TaperedSection):
+    if isinstance(part, TrussPart):
+        return part
+    if isinstance(part.section, LinearSection):
+        return replace(part, section=SectionRun(part.section, np.tile(places, (len(lines), 1))))
+    if not isinstance(part.section, TaperedSection):
         return part
     shares = taper_shares(part.section, mesh, lines, what)
     at = shares[:, :1] * (1.0 - places) + shares[:, 1:] * places

@@ -11,14 +11,14 @@ import meshio
 
 import fem.formats.meshio_kinds  # noqa: F401  (completes meshio's tables)
 from fem.base.errors import ModelError, quoted
-from fem.formats.abaqus import read_abaqus
+from fem.formats.abaqus import AbaqusFile, read_abaqus
 from fem.formats.abaqus.deck import bare
 from fem.formats.faults import reason_of
 from fem.formats.from_meshio import from_meshio, structure_from_meshio
 from fem.formats.gmsh import read_gmsh
 from fem.formats.ignored import without_cells
 from fem.formats.med import read_med
-from fem.formats.nastran import read_nastran
+from fem.formats.nastran import NastranFile, read_nastran
 from fem.formats.unv import read_unv
 from fem.formats.vtk import read_vtk, read_vtu
 from fem.mesh.frame_mesh import FrameMesh
@@ -35,7 +35,7 @@ READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
 }
 DECK = ".inp"
 """The extension of files that hold more than a mesh."""
-NASTRAN = (".bdf", ".nas")
+NASTRAN = (".bdf", ".dat", ".nas")
 UNIVERSAL = ".unv"
 ARCHIVE = ".cdb"
 EXTENSIONS = (*READERS, UNIVERSAL, DECK, *NASTRAN)
@@ -59,16 +59,17 @@ def read_mesh(
           and a point array ``set:NAME`` that is 1 at one node names a point.
         - ``.med``: MED of version 3 or later. Groups of edges and of nodes are parts and points.
         - ``.unv``: universal file, as Salome writes it, with its groups likewise.
-        - ``.bdf``, ``.nas``: Nastran bulk data, of which solids are read, so for `read_structure`
-          only. Properties are the parts, "PSOLID 3"; there are no names of points.
+        - ``.bdf``, ``.dat``, ``.nas``: Nastran bulk data, with supports, masses and springs.
+          Properties are the parts, "PBAR 3".
         - ``.inp``: Abaqus input. ELSET and NSET, also those given on ``*ELEMENT`` and ``*NODE``.
 
     include_folders
-        Folders from which an Abaqus file may ``*INCLUDE`` others, beside its own.
+        Folders from which decks may include other files, beside their own.
     ignore
         Cells to leave out: names of groups, kinds of cells such as "quad", element types of
         Abaqus such as "S4R", or "ungrouped" for those in no group. Of an Abaqus file also what is
-        refused: element types and keywords such as ``GAPUNI`` and ``*CONTACT PAIR``.
+        refused: element types and keywords such as ``GAPUNI`` and ``*CONTACT PAIR``; of Nastran
+        names of cards such as ``CGAP``.
 
     Returns
     -------
@@ -155,9 +156,9 @@ def _read(
         if extension == DECK:
             return _deck_mesh(path, build, include_folders, ignore)
         if extension in NASTRAN:
-            solids, left_out = read_nastran(path)
-            content, said = without_cells(solids, ignore, str(path))
-            return replace(_noted(build(content, str(path)), said), left_out=left_out)
+            deck = read_nastran(path, include_folders, ignore)
+            others = [name for name in ignore if name.upper() not in deck.ignored]
+            return _with_attached(path, build, deck, others)
         whole, left_out = (
             read_unv(path) if extension == UNIVERSAL else (READERS[extension][1](path), [])
         )
@@ -183,7 +184,17 @@ def _deck_mesh(
     """The mesh of an Abaqus file, with what the file attaches to it."""
     found = read_abaqus(path, include_folders, ignore)
     others = [name for name in ignore if bare(name) not in found.ignored]
-    content, said = without_cells(found.content, others, str(path))
+    return _with_attached(path, build, found, others)
+
+
+def _with_attached(
+    path: Path,
+    build: Callable[[meshio.Mesh, str], Mesh],
+    found: AbaqusFile | NastranFile,
+    ignore: Sequence[str],
+) -> Mesh:
+    """The mesh of a deck, with what the deck attaches to it and says of it."""
+    content, said = without_cells(found.content, ignore, str(path))
     notes = list(found.notes) + said
     return replace(
         _noted(build(content, str(path)), notes),

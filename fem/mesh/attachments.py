@@ -1,14 +1,17 @@
-"""What is attached to points: masses, springs, dampers, couplings and linear equations."""
+"""What is attached to points: supports, masses, springs, couplings, equations and matrices."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 
+import numpy as np
+
 from fem.base.errors import ModelError, check_positive, is_finite, quoted
 
 DIRECTIONS = ("x", "y", "rotation")
 """Of a plane frame; "rotation" is about z."""
+SYMMETRIC = 1e-9  # of the largest entry: difference of two that are rounding
 SPATIAL_DIRECTIONS = (*DIRECTIONS, "z", "rotation_x", "rotation_y", "rotation_z")
 
 
@@ -37,6 +40,39 @@ def vector(what: str, values: Sequence[float], length: int) -> tuple[float, ...]
     if len(given) != length or not all(is_finite(value) for value in given):
         raise ModelError(f"{what} must be {length} finite numbers, not {values!r}")
     return tuple(float(value) for value in given)
+
+
+@dataclass(frozen=True)
+class Support:
+    """Directions of a point that are held: any of "x", "y", "rotation".
+
+    A clamp holds all three; a plane of symmetry normal to x holds ("x", "rotation"). In a
+    structure there are also "z", "rotation_x", "rotation_y" and "rotation_z" (the same as
+    "rotation"), and the point may be a face; nodes of solids have no rotation to hold.
+
+    Examples
+    --------
+    >>> Support("foot", ("x", "y", "rotation")).directions
+    ('x', 'y', 'rotation')
+    >>> Support("end", "y").directions
+    ('y',)
+    """
+
+    point: str
+    directions: Sequence[str]
+
+    def __post_init__(self) -> None:
+        owner = f"support at {self.point!r}"
+        given = (self.directions,) if isinstance(self.directions, str) else self.directions
+        if not isinstance(given, Sequence):
+            raise ModelError(f"{owner}: directions must be a list of names, not {given!r}")
+        object.__setattr__(self, "directions", tuple(given))
+        if not given:
+            raise ModelError(f"{owner}: no direction is held")
+        for name in given:
+            known_direction(owner, name)
+            if given.count(name) > 1:
+                raise ModelError(f"{owner}: direction {name!r} is given twice")
 
 
 @dataclass(frozen=True)
@@ -226,15 +262,76 @@ class LinearEquation:
         return tuple(point for point, _, _ in self.terms)
 
 
+Matrix = Sequence[Sequence[float]]
+
+
+@dataclass(frozen=True)
+class PointMatrix:
+    """Stiffness, mass and damping between directions of points, as symmetric matrices.
+
+    Parameters
+    ----------
+    terms
+        (point, direction) of each row, k of them.
+    stiffness, mass, damping
+        Rows of shape (k, k); empty for none. Units are N/m, kg and N s/m for translations.
+    origin
+        What it comes from, for error texts.
+
+    Raises
+    ------
+    ModelError
+        If a matrix has another shape, is not finite or is not symmetric.
+
+    Examples
+    --------
+    >>> PointMatrix([("a", "x"), ("b", "y")], stiffness=[[2.0, 1.0], [1.0, 2.0]]).points
+    ('a', 'b')
+    """
+
+    terms: Sequence[tuple[str, str]]
+    stiffness: Matrix = ()
+    mass: Matrix = ()
+    damping: Matrix = ()
+    origin: str = "matrix"
+
+    def __post_init__(self) -> None:
+        terms = tuple((str(point), str(way)) for point, way in self.terms)
+        object.__setattr__(self, "terms", terms)
+        for point, direction in terms:
+            known_direction(f"{self.origin}: {point!r}", direction)
+        for name in ("stiffness", "mass", "damping"):
+            given = getattr(self, name)
+            if not len(given):
+                object.__setattr__(self, name, ())
+                continue
+            rows = np.array(given, dtype=np.float64)
+            square = rows.shape == (len(terms), len(terms)) and bool(np.isfinite(rows).all())
+            if not square or np.abs(rows - rows.T).max() > SYMMETRIC * np.abs(rows).max():
+                raise ModelError(
+                    f"{self.origin}: {name} must be a symmetric matrix of {len(terms)} rows"
+                )
+            object.__setattr__(self, name, tuple(map(tuple, rows.tolist())))
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Its points, in the order of the terms."""
+        return tuple(point for point, _ in self.terms)
+
+
 @dataclass(frozen=True)
 class Attachments:
     """What a mesh file brings beside its cells; a model assembles it together with its own.
 
     Parameters
     ----------
-    point_masses, links, couplings, equations
+    point_masses, links, couplings, equations, supports, matrices
         Their points are point sets of the mesh, made for the purpose where they had no name
         ("node 17").
+    turning
+        Names of point sets whose nodes have rotations, also where only solids meet them.
+    loose
+        Names of point sets of which directions that nothing resists are held.
 
     Examples
     --------
@@ -248,6 +345,10 @@ class Attachments:
     links: Sequence[Link] = ()
     couplings: Sequence[Coupling] = ()
     equations: Sequence[LinearEquation] = ()
+    supports: Sequence[Support] = ()
+    matrices: Sequence[PointMatrix] = ()
+    turning: Sequence[str] = ()
+    loose: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         for each in fields(self):
@@ -260,10 +361,19 @@ class Attachments:
         names += [point for link in self.links for point in link.points]
         names += [point for equation in self.equations for point in equation.points]
         names += [name for item in self.couplings for name in (item.point, item.face)]
+        names += [item.point for item in self.supports]
+        names += [point for item in self.matrices for point in item.points]
+        names += [*self.turning, *self.loose]
         return tuple(dict.fromkeys(names))
 
     def __bool__(self) -> bool:
         return any(getattr(self, each.name) for each in fields(self))
+
+    @property
+    def measured(self) -> bool:
+        """Whether something of it has a unit, which changes with that of the coordinates."""
+        plain = ("supports", "turning", "loose")
+        return any(getattr(self, each.name) for each in fields(self) if each.name not in plain)
 
     def __str__(self) -> str:
         counts = [(len(getattr(self, f.name)), f.name.replace("_", " ")) for f in fields(self)]

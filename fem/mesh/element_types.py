@@ -10,6 +10,10 @@ from fem.base.arrays import IntArray
 from fem.base.errors import ModelError, quoted
 
 FAMILIES: tuple[tuple[str, str], ...] = (
+    (r"CROD|CONROD|CTUBE", "truss"),
+    (r"CBAR|CBEAM", "beam"),
+    (r"CQUAD[48R]|CTRIA[36R]", "shell"),
+    (r"CTETRA|CPYRAM?|CPENTA|CHEXA", "solid"),
     (r"(T2D|T3D)\d.*", "truss"),
     (r"(B2|B3|PIPE|FRAME).*", "beam"),
     (r"(S\d|STRI).*", "shell"),
@@ -17,7 +21,7 @@ FAMILIES: tuple[tuple[str, str], ...] = (
     (r"(CPS|CPE).*", "plane solid"),
     (r"C3D.*", "solid"),
 )
-"""Patterns of the names of element types as Abaqus and CalculiX have them, and their families."""
+"""Patterns of the names of elements of Nastran, Abaqus and CalculiX, and their families."""
 
 FITTING: Mapping[str, frozenset[str]] = {
     "BeamPart": frozenset({"beam"}),

@@ -17,12 +17,13 @@ from fem.mesh.attachments import (
     Attachments,
     PointMass,
     PointSpring,
+    Support,
     plane_direction,
 )
 from fem.mesh.element_types import check_family, counted
 from fem.mesh.frame_mesh import FrameMesh
 from fem.model.parts import BeamPart, TrussPart
-from fem.model.supports import Hinge, Interface, Support
+from fem.model.supports import Hinge, Interface
 
 LISTS = {"supports": Support, "point_masses": PointMass, "springs": PointSpring, "hinges": Hinge}
 TABLES: dict[str, tuple[object, str]] = {
@@ -142,7 +143,7 @@ class FrameModel:
                 )
         self._check_attached()
         for name, part in self.parts.items():
-            if isinstance(part, BeamPart) and (part.orientation is not None or any(part.offset)):
+            if isinstance(part, BeamPart) and _is_spatial(part):
                 raise ModelError(
                     f"{self.mesh.source}: part {name!r} has an orientation or an offset, which a"
                     " plane frame does not have; use a StructureModel"
@@ -157,11 +158,18 @@ class FrameModel:
     def _check_attached(self) -> None:
         """Refuse what the file of the mesh attaches and a plane frame does not have."""
         brought = self.mesh.attachments
-        for what, items in (("coupling", brought.couplings), ("equation", brought.equations)):
+        spatial = {
+            "coupling": brought.couplings,
+            "equation": brought.equations,
+            "matrix": brought.matrices,
+            "support": brought.supports,
+        }
+        for what, items in spatial.items():
             if items:
                 raise ModelError(
-                    f"{self.mesh.source}: the file has couplings or linear equations ({len(items)}"
-                    f" of the kind {what}), which a plane frame does not have; use a StructureModel"
+                    f"{self.mesh.source}: the file has couplings, linear equations, matrices or"
+                    f" supports ({len(items)} of the kind {what}), which a plane frame does not"
+                    " take from it; use a StructureModel"
                 )
         for link in brought.links:
             for direction in link.directions or ():
@@ -283,3 +291,9 @@ class FrameModel:
                     f" {interface.direction!r} of point {interface.point!r},"
                     " which a support holds"
                 )
+
+
+def _is_spatial(part: BeamPart) -> bool:
+    """Whether a beam has what only a structure in space has."""
+    spatial = part.orientation, part.end_offsets, part.released
+    return any(part.offset) or any(value is not None for value in spatial)

@@ -7,9 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from fem.base.errors import ModelError, check_positive, is_finite, quoted
 from fem.mesh.attachments import vector
-from fem.model.sections import CircularSection, CrossSection, SectionRun, TaperedSection
+from fem.model.sections import (
+    CircularSection,
+    CrossSection,
+    LinearSection,
+    SectionRun,
+    TaperedSection,
+)
 
 THEORIES = ("euler-bernoulli", "timoshenko")
 PLANES = ("stress", "strain")
@@ -26,7 +34,7 @@ class Material:
     youngs_modulus
         E in N/m².
     density
-        rho in kg/m³.
+        rho in kg/m³; 0 for what has stiffness alone.
     poissons_ratio
         nu; solids, Timoshenko beams and beams in space need it.
 
@@ -41,7 +49,11 @@ class Material:
     poissons_ratio: float | None = None
 
     def __post_init__(self) -> None:
-        check_positive("material", youngs_modulus=self.youngs_modulus, density=self.density)
+        check_positive("material", youngs_modulus=self.youngs_modulus)
+        if not (is_finite(self.density) and self.density >= 0.0):
+            raise ModelError(
+                f"material: density must be finite and not negative, not {self.density!r}"
+            )
         nu = self.poissons_ratio
         if nu is not None and not (is_finite(nu) and -1.0 < nu < 0.5):
             raise ModelError(f"material: poissons_ratio must be above -1 and below 0.5, not {nu!r}")
@@ -68,35 +80,71 @@ class BeamPart:
     orientation
         In space: direction of the section's height, any vector not along the beam; only its part
         across the beam counts. By default the height lies in planes z = constant as in a plane
-        frame, which beams along z cannot do.
+        frame, which beams along z cannot do. One vector, or one for each line of the part.
     offset
         In space: place (along the height, along the width) in m of the beam's axis as seen from
         the line between its nodes, for eccentric connections.
+    end_offsets
+        In space: places (x, y, z) in m of both ends of the axis as seen from the nodes, in the
+        axes of the whole and beside `offset`; two, or two for each line.
+    released
+        In space: directions in which an end of the beam is not joined to its node, for each end
+        numbers out of 0 to 5: along and about the axes of the section, x along the beam, y along
+        its height and z along its width. Two tuples, or two for each line.
+
+    Examples
+    --------
+    A beam whose second end turns freely about its width:
+
+    >>> material, section = Material(2.1e11, 7800.0, 0.3), CircularSection(0.02)
+    >>> BeamPart(material, section, released=((), (5,))).released
+    ((), (5,))
     """
 
     material: Material
     section: Any
     theory: str = "euler-bernoulli"
     axial_force: float = 0.0
-    orientation: Sequence[float] | None = None
+    orientation: Any = None
     offset: Sequence[float] = (0.0, 0.0)
+    end_offsets: Any = None
+    released: Any = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.material, Material):
             raise ModelError(f"part: material must be a Material, not {self.material!r}")
-        if not isinstance(self.section, TaperedSection | SectionRun):
+        if not isinstance(self.section, TaperedSection | LinearSection | SectionRun):
             self._check_section(self.section)
         if self.theory not in THEORIES:
             raise ModelError(f"part: theory must be one of {quoted(THEORIES)}, not {self.theory!r}")
         if not is_finite(self.axial_force):
             raise ModelError(f"part: axial_force must be finite, not {self.axial_force!r}")
         object.__setattr__(self, "offset", vector("part: offset", self.offset, 2))
-        if self.orientation is not None:
-            object.__setattr__(
-                self, "orientation", vector("part: orientation", self.orientation, 3)
+        self._take("orientation", (3,))
+        self._take("end_offsets", (2, 3))
+        if self.orientation is not None and not np.any(self.orientation, axis=-1).all():
+            raise ModelError("part: orientation must not be the zero vector")
+        if self.released is not None:
+            object.__setattr__(self, "released", _tuples(self.released))
+            each = np.ravel(np.array(_flat(self.released), dtype=object))
+            if not all(isinstance(d, int) and 0 <= d <= 5 for d in each):
+                raise ModelError("part: released must be directions out of 0 to 5 of both ends")
+
+    def _take(self, name: str, shape: tuple[int, ...]) -> None:
+        """Keep numbers of a shape, or of this shape for each line, as tuples."""
+        given = getattr(self, name)
+        if given is None:
+            return
+        try:
+            values = np.array(given, dtype=np.float64)
+        except (TypeError, ValueError):
+            values = np.array([np.nan])
+        if values.shape not in (shape, (len(values), *shape)) or not np.isfinite(values).all():
+            raise ModelError(
+                f"part: {name} must be finite numbers of shape {shape}, or of it for each line,"
+                f" not {given!r}"
             )
-            if not any(self.orientation):
-                raise ModelError("part: orientation must not be the zero vector")
+        object.__setattr__(self, name, _tuples(values.tolist()))
 
     @staticmethod
     def _check_section(section: CrossSection) -> None:
@@ -105,6 +153,18 @@ class BeamPart:
                 f"part: section must have an area and a second_moment, not be {section!r}"
             )
         check_positive("section", area=section.area, second_moment=section.second_moment)
+
+
+def _tuples(values: Any) -> Any:
+    """Nested lists as nested tuples."""
+    return tuple(map(_tuples, values)) if isinstance(values, list | tuple) else values
+
+
+def _flat(values: Any) -> list[Any]:
+    """The innermost values of nested tuples."""
+    if not isinstance(values, tuple):
+        return [values]
+    return [one for each in values for one in _flat(each)]
 
 
 @dataclass(frozen=True)

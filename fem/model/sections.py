@@ -232,6 +232,38 @@ class TaperedSection:
         return type(self.start)(**{n: (1.0 - share) * a + share * b for (n, a), b in sizes})
 
 
+@dataclass(frozen=True)
+class LinearSection:
+    """A section whose numbers change linearly from the first to the second end of every line.
+
+    Parameters
+    ----------
+    start, end
+        At the ends, with all numbers that the beam needs.
+
+    Examples
+    --------
+    >>> LinearSection(Section(2.0, 1.0), Section(4.0, 3.0)).at(0.25).area
+    2.5
+    """
+
+    start: Section
+    end: Section
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.start, Section) or not isinstance(self.end, Section):
+            raise ModelError("linear section: start and end must be of the class Section")
+
+    def at(self, share: float) -> Section:
+        """The section at a share of the way between 0 and 1."""
+        pairs = zip(vars(self.start).items(), vars(self.end).values(), strict=True)
+        numbers: dict[str, Any] = {
+            name: None if a is None or b is None else (1.0 - share) * a + share * b
+            for (name, a), b in pairs
+        }
+        return Section(**numbers)
+
+
 @dataclass(frozen=True, eq=False)
 class SectionRun:
     """The numbers of a tapered section at places along lines, as arrays of the shape of `shares`.
@@ -244,11 +276,11 @@ class SectionRun:
         Of the way from its start to its end, shape (e, q).
     """
 
-    taper: TaperedSection
+    taper: TaperedSection | LinearSection
     shares: npt.NDArray[np.float64]
 
     @cached_property
-    def sections(self) -> list[RectangularSection | CircularSection]:
+    def sections(self) -> list[Any]:
         """One after the other."""
         return [self.taper.at(float(share)) for share in self.shares.ravel()]
 

@@ -14,7 +14,15 @@ import numpy.typing as npt
 
 from fem.base.errors import ModelError
 from fem.base.files import draft_of, plain_write_errors
-from fem.mesh.attachments import Attachments, Coupling, LinearEquation, Link, PointMass
+from fem.mesh.attachments import (
+    Attachments,
+    Coupling,
+    LinearEquation,
+    Link,
+    PointMass,
+    PointMatrix,
+    Support,
+)
 from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.structure_mesh import StructureMesh
 from fem.model.frame import LISTS as FRAME_LISTS
@@ -23,6 +31,7 @@ from fem.model.parts import BeamPart, Material, ShellPart, SolidPart, TrussPart
 from fem.model.sections import (
     CircularSection,
     CrossSection,
+    LinearSection,
     RectangularSection,
     Section,
     TaperedSection,
@@ -41,10 +50,13 @@ BROUGHT: Lists = {
     "links": Link,
     "couplings": Coupling,
     "equations": LinearEquation,
+    "supports": Support,
+    "matrices": PointMatrix,
 }
 PARTS = {kind.__name__: kind for kind in (BeamPart, TrussPart, SolidPart, ShellPart)}
 SECTIONS = {
-    kind.__name__: kind for kind in (RectangularSection, CircularSection, Section, TaperedSection)
+    kind.__name__: kind
+    for kind in (RectangularSection, CircularSection, Section, TaperedSection, LinearSection)
 }
 
 
@@ -188,7 +200,7 @@ def _attached(model: FrameModel | StructureModel, lists: Lists) -> dict[str, Any
     return {
         "source": model.mesh.source,
         "from file": {
-            item.name: [asdict(each) for each in getattr(model.mesh.attachments, item.name)]
+            item.name: [_plain(each) for each in getattr(model.mesh.attachments, item.name)]
             for item in fields(Attachments)
         },
         "parts": {name: _part(part) for name, part in model.parts.items()},
@@ -200,9 +212,13 @@ def _attached(model: FrameModel | StructureModel, lists: Lists) -> dict[str, Any
 
 def _from_file(attached: dict[str, Any]) -> Attachments:
     given = attached["from file"]
-    return Attachments(
-        **{name: [kind(**item) for item in given[name]] for name, kind in BROUGHT.items()}
-    )
+    made = {name: [kind(**i) for i in given.get(name, [])] for name, kind in BROUGHT.items()}
+    return Attachments(**made, turning=given.get("turning", ()), loose=given.get("loose", ()))
+
+
+def _plain(item: Any) -> Any:
+    """A name as it is; all else as a dictionary."""
+    return item if isinstance(item, str) else asdict(item)
 
 
 def _items(attached: dict[str, Any], lists: Lists) -> dict[str, Any]:
@@ -232,15 +248,15 @@ def _part_from(plain: dict[str, Any]) -> Any:
 def _section_from(plain: dict[str, Any]) -> Any:
     plain = dict(plain)
     sort = SECTIONS[plain.pop("kind")]
-    if sort is TaperedSection:
+    if sort in (TaperedSection, LinearSection):
         plain |= {end: _section_from(plain[end]) for end in ("start", "end")}
     return sort(**plain)
 
 
 def _section(section: Any, poissons_ratio: float | None) -> dict[str, Any]:
-    if isinstance(section, TaperedSection):
+    if isinstance(section, TaperedSection | LinearSection):
         ends = {end: _section(getattr(section, end), None) for end in ("start", "end")}
-        return {"kind": "TaperedSection", **asdict(section), **ends}
+        return {"kind": type(section).__name__, **asdict(section), **ends}
     if type(section).__name__ not in SECTIONS:
         section = _plain_section(section, poissons_ratio)
     return {"kind": type(section).__name__, **asdict(section)}

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError, by_name, listed, quoted
-from fem.mesh.attachments import Attachments, Coupling, PointMass, PointSpring
+from fem.mesh.attachments import Attachments, Coupling, PointMass, PointSpring, Support
 from fem.mesh.cells import KINDS, SPANS, CellKind, all_facets, facet_keys
 from fem.mesh.doubled import check_no_doubles
 from fem.mesh.element_types import check_family, counted, integration
@@ -21,7 +21,7 @@ from fem.mesh.shell_centres import with_centres
 from fem.mesh.shell_facets import facets_of, shell_kinds
 from fem.mesh.structure_mesh import StructureMesh, structure_mesh
 from fem.model.parts import BeamPart, ShellPart, SolidPart, TrussPart
-from fem.model.supports import Foundation, Hinge, Interface, Support
+from fem.model.supports import Foundation, Hinge, Interface
 
 AXES = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
 """The six directions of a node, in the order of `StructureComponent.shape`."""
@@ -220,8 +220,8 @@ class StructureModel:
 
     @cached_property
     def attached(self) -> Attachments:
-        """Masses, links, couplings and equations: of the mesh's file, and the model's own."""
-        own = Attachments(self.point_masses, couplings=self.couplings)
+        """What is attached and held: by the mesh's file, and by the model itself."""
+        own = Attachments(self.point_masses, couplings=self.couplings, supports=self.supports)
         return self.mesh.attachments + own
 
     @cached_property
@@ -258,6 +258,7 @@ class StructureModel:
             pairs.append(np.stack([point, nodes], axis=1))
         names = [link.points for link in self.attached.links]
         names += [equation.points for equation in self.attached.equations]
+        names += [matrix.points for matrix in self.attached.matrices]
         for points in names:
             joined = [self.mesh.node(point) for point in points]
             pairs.append(np.array([[joined[0], node] for node in joined], dtype=np.int64))
@@ -398,7 +399,8 @@ class StructureModel:
                 f"{self.mesh.source}: a plane structure needs one z at all nodes, but z runs from"
                 f" {z.min():g} to {z.max():g}"
             )
-        named = [(f"support at {s.point!r}", d) for s in self.supports for d in s.directions]
+        held = self.attached.supports
+        named = [(f"support at {s.point!r}", d) for s in held for d in s.directions]
         named += [(f"spring at {spring.point!r}", spring.direction) for spring in self.springs]
         named += [(f"interface {name!r}", i.direction) for name, i in self.interfaces.items()]
         for owner, direction in named:
@@ -414,11 +416,12 @@ class StructureModel:
         return cells + [nodes for _, kinds in bodies for nodes in kinds.values()]
 
     def _check_names(self) -> None:
-        for support in self.supports:
+        for support in self.attached.supports:
             self.mesh.nodes(support.point)
         points = [item.point for item in self.attached.point_masses]
         points += [p for item in self.attached.links for p in item.points]
         points += [p for item in self.attached.equations for p in item.points]
+        points += [p for item in self.attached.matrices for p in item.points]
         points += [item.point for item in self.springs]
         points += [item.point for item in self.hinges]
         points += [item.point for item in self.interfaces.values()]

@@ -10,39 +10,6 @@ from fem.mesh.attachments import known_direction, vector
 
 
 @dataclass(frozen=True)
-class Support:
-    """Directions of a point that are held: any of "x", "y", "rotation".
-
-    A clamp holds all three; a plane of symmetry normal to x holds ("x", "rotation"). In a
-    structure there are also "z", "rotation_x", "rotation_y" and "rotation_z" (the same as
-    "rotation"), and the point may be a face; nodes of solids have no rotation to hold.
-
-    Examples
-    --------
-    >>> Support("foot", ("x", "y", "rotation")).directions
-    ('x', 'y', 'rotation')
-    >>> Support("end", "y").directions
-    ('y',)
-    """
-
-    point: str
-    directions: Sequence[str]
-
-    def __post_init__(self) -> None:
-        owner = f"support at {self.point!r}"
-        given = (self.directions,) if isinstance(self.directions, str) else self.directions
-        if not isinstance(given, Sequence):
-            raise ModelError(f"{owner}: directions must be a list of names, not {given!r}")
-        object.__setattr__(self, "directions", tuple(given))
-        if not given:
-            raise ModelError(f"{owner}: no direction is held")
-        for name in given:
-            known_direction(owner, name)
-            if given.count(name) > 1:
-                raise ModelError(f"{owner}: direction {name!r} is given twice")
-
-
-@dataclass(frozen=True)
 class Hinge:
     """A rotary joint: the named part keeps its own rotation at the point.
 

@@ -12,7 +12,7 @@ from fem.assembly.shells import shell_pieces
 from fem.assembly.structure import StructureComponent
 from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError, quoted
-from fem.elements.beams import local_axes, plane_matrices, spatial_matrices, to_nodes
+from fem.elements.beams import local_axes, plane_matrices, run, spatial_matrices, to_nodes
 from fem.elements.shell_stress import outer_stress
 from fem.elements.shells import facet_batches
 from fem.elements.solids import gradients_and_volumes, strains
@@ -196,9 +196,8 @@ def _beam_values(drawing: StructureSurface, u: FloatArray, colour: str) -> Itera
         what = f"{model.mesh.source}: part {name!r}"
         T = to_nodes(part, local_axes(part, spans, what))
         ends = drawing.component.element_shape(u, name).reshape(-1, 12)
-        K, _ = spatial_matrices(
-            along(part, model.mesh, lines, what), np.linalg.norm(spans, axis=1), what
-        )
+        lengths = np.linalg.norm(run(part, spans, what), axis=1)
+        K, _ = spatial_matrices(along(part, model.mesh, lines, what), lengths, what)
         forces = np.einsum("eij,ejk,ek->ei", K, T, ends)
         about_z = np.abs(_along(-forces[:, 5], forces[:, 11], swept.places))
         about_y = np.abs(_along(-forces[:, 4], forces[:, 10], swept.places))

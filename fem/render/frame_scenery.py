@@ -13,8 +13,7 @@ from fem.assembly.frame import Component
 from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError
 from fem.elements.tapers import along
-from fem.mesh.attachments import PointMass
-from fem.model.supports import Support
+from fem.mesh.attachments import PointMass, Support
 from fem.render.frame_surface import FrameSurface, nodes_on, outline, reflected, symmetry_normal
 
 BLOCK_DENSITY = 7800.0

@@ -57,7 +57,7 @@ def support_marks(drawing: StructureSurface) -> Iterator[tuple[Any, bool]]:
 
     model = drawing.component.model
     mark = MARK_FRACTION * size_of(drawing)
-    for support in model.supports:
+    for support in model.attached.supports:
         translations = {"x", "y", "z"} & set(support.directions)
         one_axis = len(translations) == 1
         facets = {} if model.is_plane else model.facets_on(support.point)

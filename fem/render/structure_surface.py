@@ -11,7 +11,7 @@ import numpy as np
 from fem.assembly.structure import StructureComponent
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
-from fem.elements.beams import local_axes, to_nodes
+from fem.elements.beams import local_axes, run, to_nodes
 from fem.elements.tapers import along
 from fem.elements.trusses import chords
 from fem.mesh.cells import KINDS, SPANS
@@ -120,7 +120,11 @@ class StructureSurface:
         part, lines = swept_parts(model)[name]
         start = model.mesh.points[lines[:, 0]]
         spans = model.mesh.points[lines[:, 1]] - start
-        axes = local_axes(part, spans, f"{model.mesh.source}: part {name!r}")
+        what = f"{model.mesh.source}: part {name!r}"
+        axes = local_axes(part, spans, what)
+        spans = run(part, spans, what)
+        if part.end_offsets is not None:
+            start = start + np.array(part.end_offsets)[..., 0, :]
         ends = line_shape(self.component, u, name).reshape(-1, 12)
         local = np.einsum("eij,ej->ei", to_nodes(part, axes), ends)
         moved, slope, twist = local_deflection(local, np.linalg.norm(spans, axis=1), swept.places)

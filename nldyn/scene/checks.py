@@ -245,7 +245,8 @@ def _check_structure(scene: Scene, report: Report) -> None:
                     (key,), f"describes a mesh, but the structure is given by [{kinds[0]}]"
                 )
         return
-    twice = [name for name in scene.mesh.parts_from_file if name in scene.parts]
+    named = () if scene.mesh.parts_from_file == "all" else scene.mesh.parts_from_file
+    twice = [name for name in named if name in scene.parts]
     if twice:
         fault = f"names '{twice[0]}', which [parts] gives, too; keep one of them"
         raise report(("mesh", "parts_from_file"), fault)

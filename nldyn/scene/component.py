@@ -101,7 +101,7 @@ def _in_metres(scene: Scene, mesh: Mesh) -> Mesh:
         raise scene_error(scene.file, ("mesh", "file"), f"{fault} take, 'm' if it is wrong")
     if unit == "m":
         return mesh
-    if mesh.attachments or scene.mesh.parts_from_file:
+    if mesh.attachments.measured or scene.mesh.parts_from_file:
         fault = f"'{unit}' tells the unit of lengths alone, but masses, springs or parts are taken"
         raise scene_error(scene.file, ("mesh", "unit"), f"{fault} from the file, too")
     return mesh.with_points(METRES[unit] * mesh.points)
@@ -173,12 +173,16 @@ def _attached(scene: Scene) -> dict[str, Any]:
 
 
 def _truss(table: PartTable) -> fem.TrussPart:
+    if isinstance(table._made, fem.TrussPart):
+        return table._made
     assert table.area is not None
     material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
     return fem.TrussPart(material, table.area)
 
 
 def _part(table: PartTable) -> fem.BeamPart | fem.TrussPart | fem.SolidPart | fem.ShellPart:
+    if isinstance(table._made, fem.SolidPart | fem.ShellPart):
+        return table._made
     material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
     if table.kind == "solid":
         return fem.SolidPart(material, table.plane, table.thickness, table.integration)
@@ -189,6 +193,8 @@ def _part(table: PartTable) -> fem.BeamPart | fem.TrussPart | fem.SolidPart | fe
 
 
 def _beam(table: PartTable) -> fem.BeamPart:
+    if isinstance(table._made, fem.BeamPart):
+        return table._made
     material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
     return fem.BeamPart(
         material,

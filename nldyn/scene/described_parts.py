@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
 from pydantic import ValidationError
 
+import fem
 from nldyn.scene.messages import quoted, scene_error, show
 from nldyn.scene.schema import PartTable, Scene
 
-REFUSED = "refused"
+MADE, REFUSED = "made", "refused"
+KINDS = {
+    fem.BeamPart: "beam",
+    fem.TrussPart: "truss",
+    fem.SolidPart: "solid",
+    fem.ShellPart: "shell",
+}
 SAME = 1e-6  # relative
 
 
@@ -35,7 +42,7 @@ def with_described_parts(scene: Scene, mesh: DescribedMesh) -> Scene:
         return scene
     key = ("mesh", "parts_from_file")
     parts = dict(scene.parts)
-    for name in scene.mesh.parts_from_file:
+    for name in named_parts(scene, mesh):
         if name not in mesh.described:
             known = quoted(mesh.described) if mesh.described else "none"
             fault = f"names '{name}', which the mesh file does not describe; it describes {known}"
@@ -43,6 +50,9 @@ def with_described_parts(scene: Scene, mesh: DescribedMesh) -> Scene:
         given = mesh.described[name]
         if REFUSED in given:
             raise scene_error(scene.file, key, f"names '{name}': {given[REFUSED]}")
+        if MADE in given:
+            parts[name] = table_of(given[MADE])
+            continue
         try:
             parts[name] = PartTable.model_validate(dict(given))
         except ValidationError as error:
@@ -53,17 +63,42 @@ def with_described_parts(scene: Scene, mesh: DescribedMesh) -> Scene:
     return scene.model_copy(update={"parts": parts})
 
 
+def named_parts(scene: Scene, mesh: DescribedMesh) -> list[str]:
+    """The parts that are taken from the file: those that are named, or all others."""
+    assert scene.mesh is not None
+    if scene.mesh.parts_from_file == "all":
+        return [name for name in mesh.described if name not in scene.parts]
+    return list(scene.mesh.parts_from_file)
+
+
+def table_of(part: Any) -> PartTable:
+    """The table of a part that the file of the mesh makes whole, with its plain numbers."""
+    given = {"thickness": getattr(part, "thickness", None), "area": getattr(part, "area", None)}
+    material = part.material
+    table = PartTable.model_construct(
+        kind=KINDS[type(part)],
+        youngs_modulus=material.youngs_modulus,
+        density=material.density,
+        poissons_ratio=material.poissons_ratio,
+        **{key: value for key, value in given.items() if value is not None},
+    )
+    table._made = part
+    return table
+
+
 def told_otherwise(scene: Scene, mesh: DescribedMesh) -> list[str]:
     """A sentence for each part of the scene that the file of its mesh describes otherwise."""
-    own = {n: t for n, t in scene.parts.items() if n in mesh.described}
-    for name in scene.mesh.parts_from_file if scene.mesh else ():
-        own.pop(name, None)
+    own = {n: t for n, t in scene.parts.items() if n in mesh.described and t._made is None}
+    if scene.mesh and scene.mesh.parts_from_file != "all":
+        own = {n: t for n, t in own.items() if n not in scene.mesh.parts_from_file}
     found = []
     for name, table in own.items():
         given = mesh.described[name]
         if REFUSED in given:
             found.append(f"part '{name}' is as in the scene, not as in the file: {given[REFUSED]}")
             continue
+        if MADE in given:
+            given = table_of(given[MADE]).model_dump(exclude_none=True)
         other = [
             f"{key} {show(getattr(table, key))}, not {show(value)}"
             for key, value in given.items()

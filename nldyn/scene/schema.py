@@ -61,7 +61,7 @@ class MeshTable(Table):
 
     file: str
     """Mesh: Gmsh `.msh`, VTK `.vtu` or `.vtk`, MED `.med`, universal `.unv`, Abaqus or CalculiX
-    `.inp`, solids of Nastran `.bdf`. A path that is not absolute is relative to the folder of
+    `.inp`, Nastran `.bdf` or `.dat`. A path that is not absolute is relative to the folder of
     the scene file; where it may lead is [told below](#a-scene-is-data)."""
     model: Literal["frame", "structure"] = "frame"
     """`"frame"`: the lines of the mesh are a frame in a plane z = constant. `"structure"`:
@@ -69,9 +69,10 @@ class MeshTable(Table):
     mirror: str | None = None
     """Of a frame: point on the plane of symmetry of a half model. `nldyn render` then draws the
     whole structure; nothing else changes. Not in a component of several."""
-    parts_from_file: list[str] = []
-    """Names of parts whose material and section are taken from an Abaqus or CalculiX file, see
-    [decks.md](decks.md); they are not in `[parts]`."""
+    parts_from_file: list[str] | Literal["all"] = []
+    """Names of parts whose material and section are taken from the file of Abaqus or CalculiX, see
+    [decks.md](decks.md), or of [Nastran](nastran.md); they are not in `[parts]`. `"all"`: all
+    that the file describes and `[parts]` does not give."""
     unit: Literal["m", "cm", "mm", "inch"] = "m"
     """Unit of the lengths in the file: `"m"`, `"cm"`, `"mm"` or `"inch"`. It must be given
     where the file states another one than m. Everything else, in the scene and in all output,
@@ -120,6 +121,7 @@ class PlaceTable(Table):
 class PartTable(Table):
     """``[parts.NAME]``: material of one part of the mesh, and what it is: a beam, a shell, ..."""
 
+    _made: Any = PrivateAttr(None)
     kind: Literal["beam", "truss", "solid", "shell"] = "beam"
     """`"beam"`, `"truss"`, or in a structure `"solid"` or `"shell"`."""
     youngs_modulus: Positive

@@ -316,7 +316,9 @@ def test_a_missing_file_is_named(tmp_path, name):
 
 
 def test_an_unknown_extension_is_named(tmp_path):
-    known = "'.stl'; known are '.msh', '.vtu', '.vtk', '.med', '.unv', '.inp', '.bdf', '.nas'"
+    known = (
+        "'.stl'; known are '.msh', '.vtu', '.vtk', '.med', '.unv', '.inp', '.bdf', '.dat', '.nas'"
+    )
     with pytest.raises(fem.ModelError, match=re.escape(known)):
         fem.read_mesh(tmp_path / "mesh.stl")
     mesh = fem.frame_mesh({"a": (0, 0), "b": (1, 0)}, [("rod", "a", "b", 1)])

@@ -1,4 +1,4 @@
-"""Solids of Nastran bulk data, in all fields; what is not read is refused by card."""
+"""Cards and fields of Nastran, and its solids; what is not read is refused by card."""
 
 import meshio
 import numpy as np
@@ -41,7 +41,7 @@ def real(value, digits):
 def bulk(mesh, style):
     digits = {"free": 17, "small": 3, "large": 10}[style]
     write = STYLES[style]
-    rows = ["SOL 103", "CEND", "SPC = 1", "BEGIN BULK", "$ a comment", "PARAM,POST,-1"]
+    rows = ["SOL 103", "CEND", "BEGIN BULK", "$ a comment", "PARAM,POST,-1"]
     rows += ["MAT1,1,2.+11,,.3,8000.", "PSOLID,1,1", "PSOLID,2,1", "SPC1,1,123,1"]
     for label, place in enumerate(mesh.points.tolist(), start=1):
         rows.append(write(["GRID", str(label), "", *(real(x, digits) for x in place)]))
@@ -73,7 +73,8 @@ def test_all_solids_in_all_fields_are_the_component_that_was_written(tmp_path, f
     known, read = component(mesh, ["body"]), component(found, ["PSOLID 1", "PSOLID 2"])
     assert read.rigid_mass[0, 0] == pytest.approx(known.rigid_mass[0, 0], rel=1e-12)
     np.testing.assert_allclose(lowest_hz(read, 4), lowest_hz(known, 4), rtol=1e-9)
-    assert [item.keyword for item in found.left_out] == ["PARAM", "MAT1", "PSOLID", "SPC1"]
+    assert [item.keyword for item in found.left_out] == ["PARAM", "SPC1 1"]
+    assert found.described["PSOLID 2"]["made"] == fem.SolidPart(fem.Material(2e11, 8000.0, 0.3))
 
 
 BRICK = bulk(fem.box_mesh("body", (1.0, 1.0, 1.0), (1, 1, 1), kind="hexahedron"), "free")
@@ -82,21 +83,26 @@ BRICK = bulk(fem.box_mesh("body", (1.0, 1.0, 1.0), (1, 1, 1), kind="hexahedron")
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("PARAM", "CONM2,9,1,,5.\nCONM2,10,2,,5.\nCBAR,7,1,1,2\nPARAM",
-         r"CONM2 \(2, first in line 6\); CBAR \(1, first in line 8\); solids are"),
-        ("PARAM", "INCLUDE 'more.bdf'\nPARAM", r"INCLUDE \(1, first in line 6\)"),
-        ("GRID,1,,", "GRID,1,4,", "line 11: GRID: coordinates in a system of their own"),
-        ("GRID,1,,", "GRID*   1\nGRID,1,,", "line 11: GRID: has no third coordinate"),
-        ("GRID,2,", "GRID,1,", "line 12: GRID: grid point 1 is defined twice"),
-        ("GRID,8,", "GRID,99,", "the grid point 8, which is not defined"),
-        ("CHEXA,1,2,", "CHEXA,1,2,,", "line 19 has more fields than a line can have"),
+        ("PARAM", "CGAP,9,1,1,2\nCGAP,10,2,1,3\nCSHEAR,7,1,1,2\nPARAM",
+         r"CGAP \(2, first in line 5\): contact is.*; CSHEAR \(1, first in line 7\): a shear"),
+        ("PARAM", "INCLUDE 'more.bdf'\nPARAM",
+         "brick.bdf line 5: INCLUDE: the file .*more.bdf does not"),
+        ("PARAM", "NOTHING,1\nPARAM", r"NOTHING \(1, first in line 5\): it is neither read nor"),
+        ("PARAM", "PARAM,CM2,2.\nPARAM", "line 5: PARAM: CM2 scales a part of the matrices"),
+        ("GRID,1,,", "GRID,1,4,", "line 10: GRID: names the coordinate system 4, which is not"),
+        ("GRID,1,,", "GRID*   1\nGRID,1,,", "line 10: GRID: has no third coordinate"),
+        ("GRID,2,", "GRID,1,", "line 11: GRID: grid point 1 is defined twice"),
+        ("GRID,8,", "GRID,99,", "CHEXA: names the grid point 8, which is not defined"),
+        ("CHEXA,1,2,", "CHEXA,1,2,,", "line 18 has more fields than a line can have"),
         ("CHEXA,1,2,1,", "CHEXA,1,2,,", "element 1 has 7 grid points where 8 or 20 are needed"),
         ("CHEXA,1,", "CTETRA,1,", "element 1 has 8 grid points where 4 or 10 are needed"),
-        ("CHEXA,1,2", "CHEXA,1,x", "line 19: CHEXA: 'x' is not a whole number"),
-        ("GRID,1,,0.", "GRID,1,,z0.", "line 11: GRID: 'z0.*' is not a real number"),
-        ("BEGIN BULK", "BEGIN BULK\n,1,2", "line 5 goes on with a card that is not there"),
-        ("PARAM", "PSOLID,2,1,,,,,PFLUID\nPARAM", r"PSOLID: is of a fluid .*\(PFLUID\), no solid"),
-        ("CHEXA", "$CHEXA", "is no Nastran bulk data with solids|line"),
+        ("CHEXA,1,2", "CHEXA,1,x", "line 18: CHEXA: 'X' in field 3 is not a whole number"),
+        ("GRID,1,,0.", "GRID,1,,z0.", "line 10: GRID: 'Z0.*' in field 4 is not a real number"),
+        ("BEGIN BULK", "BEGIN BULK\n,1,2", "line 4 goes on with a card that is not there"),
+        ("PSOLID,2,1", "PSOLID,2,1,,,,,PFLUID", r"PSOLID: is of a fluid .*\(PFLUID\), no solid"),
+        ("PSOLID,2,1", "PSOLID,2,1,,,,,,,+A\n+B", r"goes on with the mark '\+B', but PSOLID"),
+        ("CHEXA", "$CHEXA", "is no Nastran bulk data with elements|line"),
+        ("BEGIN BULK", "BEGIN SUPER=1", "superelements are not read; write the model as one"),
     ],
 )  # fmt: skip
 def test_what_is_not_read_is_refused_with_its_place(tmp_path, old, new, said):
@@ -107,42 +113,34 @@ def test_what_is_not_read_is_refused_with_its_place(tmp_path, old, new, said):
         fem.read_structure(path)
 
 
-def test_grid_points_that_are_held_for_good_are_told(tmp_path):
+def test_cards_of_analyses_and_unused_systems_change_nothing(tmp_path):
+    """Femap writes two coordinate systems into every deck; NLPARM says how a step is solved."""
     path = tmp_path / "brick.bdf"
-    line = next(line for line in BRICK.splitlines() if line.startswith("GRID,1,"))
-    path.write_text(BRICK.replace(line, f"{line},,123", 1))
-    told = [str(item) for item in fem.read_structure(path).left_out]
-    assert "GRID with PS (1, first in line 11): supports are given by the scene" in told
+    more = "CORD2C,1,0,0.,0.,0.,0.,0.,1.\n,1.,0.,1.\nCORD2S,2,0,0.,0.,0.,0.,0.,1.\n,1.,0.,1.\n"
+    path.write_text(BRICK.replace("PARAM", f"NLPARM,1,10\nTABDMP1,3\n{more}PARAM", 1))
+    found = fem.read_structure(path)
+    assert [str(item) for item in found.left_out][:2] == [
+        "NLPARM (1, first in line 5): which analysis is made is told by the scene",
+        "TABDMP1 (1, first in line 6): which analysis is made is told by the scene",
+    ]
 
 
-@pytest.mark.filterwarnings("ignore::fem.LockingWarning")
-def test_the_advice_for_masses_and_for_shells_gives_the_model_that_was_meant(tmp_path):
-    """A mass of the deck is given to the model; shells are written as a deck of Abaqus."""
+def test_cards_to_ignore_are_left_out(tmp_path):
     path = tmp_path / "brick.bdf"
-    with_mass = BRICK.replace("ENDDATA", "CONM2,77,7,,0.25\nENDDATA", 1)
-    path.write_text(with_mass)
-    with pytest.raises(fem.ModelError, match=r"CONM2 \(1, .*; take out masses and"):
+    path.write_text(BRICK.replace("PARAM", "CGAP,9,1,1,2\nPGAP,1\nPARAM", 1))
+    found = fem.read_structure(path, ignore=["CGAP", "PGAP"])
+    assert "CGAP (1, first in line 5): it is to be ignored" in map(str, found.left_out)
+
+
+def test_included_files_are_read_and_errors_name_them(tmp_path):
+    head, points = BRICK.split("GRID,1,", 1)
+    (tmp_path / "points.inc").write_text("GRID,1," + points)
+    path = tmp_path / "brick.bdf"
+    path.write_text(f"{head}INCLUDE 'POINTS.\nINC'\n")
+    assert len(fem.read_structure(path).cells["hexahedron"]) == 1
+    (tmp_path / "points.inc").write_text("GRID,1," + points.replace("CHEXA,1,2", "CHEXA,1,x"))
+    with pytest.raises(fem.ModelError, match=r"brick.bdf: points.inc line 9: CHEXA: 'X'"):
         fem.read_structure(path)
-    path.write_text("".join(r for r in with_mass.splitlines(True) if not r.startswith("CONM2")))
-    mesh = fem.read_structure(path)
-    model = fem.StructureModel(
-        mesh.with_point_sets({"corner": np.array([6])}),
-        dict.fromkeys(mesh.groups, fem.SolidPart(STEEL)),
-        point_masses=[fem.PointMass("corner", 0.25)],
-    )
-    assert fem.mass_properties(fem.assemble(model)).mass == pytest.approx(STEEL.density + 0.25)
-    path.write_text(BRICK.replace("ENDDATA", "CQUAD4,9,3,5,6,7,8\nENDDATA", 1))
-    with pytest.raises(fem.ModelError, match=r"CQUAD4 \(1, .*; write other elements as '.inp'"):
-        fem.read_structure(path)
-    cells = mesh.cells | {"quad": mesh.cells["hexahedron"][:, 4:]}
-    groups = {**mesh.groups, "lid": {"quad": np.array([0])}}
-    types = {"S4": {"quad": np.array([0])}}
-    lid = fem.StructureMesh(mesh.points, cells, groups, element_types=types)
-    fem.write_mesh(lid, tmp_path / "brick.inp")
-    parts = dict.fromkeys(mesh.groups, fem.SolidPart(STEEL)) | {"lid": fem.ShellPart(STEEL, 0.01)}
-    read = fem.read_structure(tmp_path / "brick.inp")
-    found = fem.mass_properties(fem.assemble(fem.StructureModel(read, parts)))
-    assert found.mass == pytest.approx(1.01 * STEEL.density)
 
 
 @pytest.mark.filterwarnings("ignore::fem.LockingWarning")

@@ -1,0 +1,142 @@
+"""Materials of a deck: isotropic ones, and those of plates and solids with directions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem.base.arrays import FloatArray
+from fem.formats.nastran.cards import Card
+from fem.formats.nastran.deck import Deck
+
+SAME = 1e-3  # relative: moduli that are those of one isotropic material
+EXPANSION = "thermal expansion is not used: stiffness and mass are those of the cold structure"
+EXPANSIONS = {"MAT1": (5,), "MAT2": (8, 9, 10), "MAT8": (8, 9), "MAT9": tuple(range(23, 29))}
+
+
+@dataclass(frozen=True)
+class Isotropic:
+    """Young's and the shear modulus, Poisson's ratio and the density of MAT1."""
+
+    youngs_modulus: float
+    shear_modulus: float
+    poissons_ratio: float
+    density: float
+
+    @property
+    def consistent(self) -> bool:
+        """Whether the shear modulus is that of an isotropic material."""
+        own = self.youngs_modulus / (2.0 * (1.0 + self.poissons_ratio))
+        return abs(self.shear_modulus - own) <= SAME * own
+
+    @property
+    def plane_law(self) -> FloatArray:
+        """Stiffness (3, 3) in plane stress."""
+        E, nu = self.youngs_modulus, self.poissons_ratio
+        factor = E / (1.0 - nu**2)
+        return np.array(
+            [[factor, nu * factor, 0], [nu * factor, factor, 0], [0, 0, self.shear_modulus]]
+        )
+
+    @property
+    def shear_law(self) -> FloatArray:
+        """Stiffness (2, 2) against transverse shear."""
+        return self.shear_modulus * np.eye(2)
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Stiffness (3, 3) in plane stress and against transverse shear (2, 2), and the density."""
+
+    plane_law: FloatArray
+    shear_law: FloatArray
+    density: float
+
+
+@dataclass(frozen=True)
+class Spatial:
+    """Stiffness (6, 6) for the strains xx, yy, zz, xy, yz and zx, and the density, of MAT9."""
+
+    law: FloatArray
+    density: float
+
+
+@dataclass
+class Materials:
+    """The materials of a deck, by their numbers."""
+
+    deck: Deck
+    cards: Mapping[int, Card]
+    factor: float = 1.0
+
+    def isotropic(self, number: int, card: Card) -> Isotropic:
+        """A MAT1, for the card that names it."""
+        own = self._card(number, card)
+        if own.name != "MAT1":
+            raise card.fail(f"needs a MAT1, but material {number} is {own.name} in {own.place}")
+        return self._isotropic(own)
+
+    def _isotropic(self, card: Card) -> Isotropic:
+        self._tell_of_expansion(card)
+        E, G, nu = (card.real(at) if card.text(at) else None for at in (1, 2, 3))
+        if E is None and G is None:
+            raise card.fail("has neither E nor G")
+        if nu is None:
+            nu = 0.0 if not E or not G else E / (2.0 * G) - 1.0
+        if E is None:
+            assert G is not None
+            E = 2.0 * (1.0 + nu) * G
+        if G is None:
+            G = E / (2.0 * (1.0 + nu))
+        if not E > 0.0:
+            raise card.fail(f"its Young's modulus is {E:g} and must be positive")
+        return Isotropic(E, G, nu, self.factor * card.real(4))
+
+    def plane(self, number: int, card: Card) -> Isotropic | Plane:
+        """The material of a plate: MAT1, MAT2 or MAT8."""
+        own = self._card(number, card)
+        if own.name == "MAT1":
+            return self._isotropic(own)
+        self._tell_of_expansion(own)
+        if own.name == "MAT2":
+            g11, g12, g13, g22, g23, g33 = own.reals(1, 6)
+            law = np.array([[g11, g12, g13], [g12, g22, g23], [g13, g23, g33]])
+            # as MID3 of PSHELL its first four numbers are those of transverse shear
+            return Plane(law, np.array([[g11, g12], [g12, g22]]), self.factor * own.real(7))
+        if own.name == "MAT8":
+            return self._orthotropic(own)
+        raise card.fail(f"needs a MAT1, MAT2 or MAT8, but material {number} is {own.name}")
+
+    def _orthotropic(self, card: Card) -> Plane:
+        E1, E2, nu, G = card.reals(1, 4)
+        if not (E1 > 0.0 and E2 > 0.0 and G > 0.0 and nu**2 * E2 < E1):
+            raise card.fail("needs positive E1, E2 and G12 and a Poisson's ratio that fits them")
+        factor = 1.0 / (1.0 - nu**2 * E2 / E1)
+        law = np.array(
+            [[E1 * factor, nu * E2 * factor, 0.0], [nu * E2 * factor, E2 * factor, 0.0], [0, 0, G]]
+        )
+        return Plane(law, np.diag(card.reals(5, 2)), self.factor * card.real(7))
+
+    def solid(self, number: int, card: Card) -> Isotropic | Spatial:
+        """The material of a solid: MAT1 or MAT9."""
+        own = self._card(number, card)
+        if own.name != "MAT9":
+            return self.isotropic(number, card)
+        self._tell_of_expansion(own)
+        law = np.zeros((6, 6))
+        law[np.triu_indices(6)] = own.reals(1, 21)
+        law = law + law.T - np.diag(np.diag(law))
+        return Spatial(law, self.factor * own.real(22))
+
+    def _card(self, number: int, card: Card) -> Card:
+        if number not in self.cards:
+            raise card.fail(f"names the material {number}, which is not defined")
+        return self.cards[number]
+
+    def _tell_of_expansion(self, card: Card) -> None:
+        if any(card.text(at) and card.real(at) for at in EXPANSIONS[card.name]):
+            what = f"thermal expansion of {card.name} {card.whole(0)}"
+            if what not in self.deck.left:
+                self.deck.leave_out(what, card.place, EXPANSION)

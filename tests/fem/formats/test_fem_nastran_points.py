@@ -1,0 +1,216 @@
+"""Systems, supports, masses, springs, rigid elements and equations of Nastran in closed forms."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+import fem
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::fem.LockingWarning", "ignore::fem.JointWarning"),
+]
+
+BRICK = """GRID,1,,0.,0.,0.
+GRID,2,,1.,0.,0.
+GRID,3,,1.,1.,0.
+GRID,4,,0.,1.,0.
+GRID,5,,0.,0.,1.
+GRID,6,,1.,0.,1.
+GRID,7,,1.,1.,1.
+GRID,8,,0.,1.,1.
+CHEXA,1,1,1,2,3,4,5,6
+,7,8
+PSOLID,1,1
+MAT1,1,2.+11,,.3,8000.
+"""
+HELD = "SPC1,1,123456,1,THRU,8\n"
+
+
+def read(tmp_path, more, case="SPC = 1"):
+    path = tmp_path / "deck.bdf"
+    path.write_text(f"SOL 103\nCEND\n{case}\nBEGIN BULK\n{BRICK}{more}ENDDATA\n")
+    return fem.read_structure(path)
+
+
+def assembled(mesh, **more):
+    return fem.assemble(fem.StructureModel(mesh, fem.parts_of(mesh), separate=True, **more))
+
+
+def hz(component):
+    values = scipy.linalg.eigh(
+        component.stiffness.toarray(), component.mass.toarray(), eigvals_only=True
+    )
+    return np.sqrt(np.abs(values)) / (2.0 * np.pi)
+
+
+def test_coordinate_systems_stand_in_chains(tmp_path):
+    """A point of a spherical system in a cylindrical one in a turned rectangular one."""
+    mesh = read(
+        tmp_path,
+        "CORD2R,1,0,1.,2.,3.,2.,2.,3.\n,1.,3.,3.\n"  # z along x, x along y
+        "CORD2C,2,1,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n"
+        "CORD2S,3,2,2.,90.,1.,2.,90.,2.\n,3.,90.,1.\n"  # its origin at y' = 2, z' = 1
+        "GRID,20,3,4.,90.,90.\nGRID,21,2,5.,180.,0.5\n"
+        "GRID,31,,0.,0.,0.\nGRID,32,,0.,0.,1.\nGRID,33,,0.,1.,0.\nCORD1C,4,31,32,33\n"
+        "GRID,22,4,2.,90.,3.\n"
+        "CONM2,101,20,,1.\nCONM2,102,21,,1.\nCONM2,103,22,,1.\n",
+    )
+    # axes of 1 in basic: x' = y, y' = z, z' = x
+    # 2 has the axes of 1, and its directions at the origin of 3 are e_r = y', so the x axis of 3
+    # is y' and its y axis is z' x y' = -x'
+    origin = np.array([1.0, 2.0, 3.0]) + 2.0 * np.array([0, 0, 1.0]) + np.array([1.0, 0, 0])
+    expected = {
+        "node 20": origin + 4.0 * np.array([0, -1.0, 0]),
+        "node 21": np.array([1.0, 2.0, 3.0]) - 5.0 * np.array([0, 1.0, 0]) + [0.5, 0, 0],
+        "node 22": np.array([-2.0, 0.0, 3.0]),  # x' = y, so y' = z x y = -x
+    }
+    for name, place in expected.items():
+        np.testing.assert_allclose(mesh.points[mesh.node(name)], place, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ("CORD2R,1,2,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\nCORD2R,2,1,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n"
+         "GRID,9,1,0.,0.,0.\n", "CORD2R: coordinate system 1 rests on itself"),
+        ("CORD2R,1,0,0.,0.,0.,0.,0.,1.\n,0.,0.,2.\nGRID,9,1,0.,0.,0.\n", "lie on a line"),
+        ("CONM2,9,77,,1.\n", "CONM2: names the grid point 77, which is not defined"),
+        ("CELAS1,9,5,1,1\n", "CELAS1: names the property 5, which is not defined"),
+        ("CBUSH,9,5,1,2\n", "CBUSH: names the property PBUSH 5, which is not defined"),
+        ("SPC1,1,7,1\n", "SPC1: '7' in field 4 are not directions out of 1 to 6|'7' in field 3"),
+        ("RBE3,9,,1,123456,1.,123,2,3\n", "RBE3: its grid points do not determine all six"),
+        ("RBAR,9,1,2,123,123456\n", "RBAR: its independent directions .* are not six"),
+    ],
+)  # fmt: skip
+def test_faults_name_card_line_and_what_is_wrong(tmp_path, more, said):
+    with pytest.raises(fem.ModelError, match=said):
+        read(tmp_path, more)
+
+
+def test_case_control_chooses_supports_and_all_else_is_told(tmp_path):
+    cards = "SPC1,1,123,1,2\nSPC,2,3,12\nSPCADD,5,1,2\nSPC1,7,3,8\n"
+    mesh = read(tmp_path, cards, "SPC = 5\nSUBCASE 2\nSPC = 7")
+    held = {s.point: (s.directions, mesh.point_sets[s.point].tolist()) for s in
+            mesh.attachments.supports}  # fmt: skip
+    assert held == {
+        "SPC 1 2 5 x y z": (("x", "y", "z"), [0, 1]),
+        "SPC 1 2 5 x y": (("x", "y"), [2]),
+    }
+    assert "SPC = 5 of the first case is taken, not SPC = 7" in mesh.notes[0]
+    assert [str(item) for item in mesh.left_out] == [
+        "SPC1 7 (1, first in line 22): no SPC of case control chooses the set 7"
+    ]
+    assert not read(tmp_path, cards, "").attachments.supports
+    path = tmp_path / "bulk.bdf"
+    path.write_text(BRICK + "SPC1,3,123,1,THRU,4\n")
+    alone = fem.read_structure(path)
+    assert alone.attachments.supports and "SPC = 3, the only set, is taken" in alone.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("cards", "expected"),
+    [
+        ("CELAS2,9,4.+4,20,1\nCONM2,10,20,,2.\n", [np.sqrt(4e4 / 2)]),
+        ("PELAS,3,4.+4\nCELAS1,9,3,20,1,1,1\nCMASS2,10,2.,20,1\n", [np.sqrt(4e4 / 2)]),
+        ("SPOINT,21,22\nCELAS4,9,3.,21,0\nCELAS4,10,3.,21,22\nCMASS4,11,1.,21,0\n"
+         "CMASS4,12,1.,22,0\n",  # two masses in a row: 3 (3 -+ sqrt 5)/2
+         np.sqrt(3.0 * (3.0 + np.array([-1, 1]) * np.sqrt(5.0)) / 2.0)),
+        ("PARAM,WTMASS,.5\nPBUSH,3,K,1.,4.,9.\nCBUSH,9,3,20,,,,,0\nCONM2,10,20,,2.\n",
+         [1.0, 2.0, 3.0]),
+        # a disc on a bush that twists, its inertia given in a turned system
+        ("CORD2R,7,0,0.,0.,0.,1.,0.,0.\n,0.,1.,0.\nPBUSH,3,K,,,,8.,18.,32.\n"
+         "CBUSH,9,3,20,,,,,0\nCONM2,10,20,7,0.\n,2.,,2.,,,2.\n", [2.0, 3.0, 4.0]),
+        # in a skew system of displacements only the direction (1, 1, 0) is free
+        ("CORD2R,7,0,0.,0.,0.,0.,0.,1.\n,1.,1.,0.\nGRID,30,0,5.,5.,5.,7\nSPC1,1,23,30\n"
+         "CELAS2,9,8.,30,1\nCONM2,10,30,,2.\n", [2.0]),
+        # a mass on a massless rigid lever of length 2, turned by a spring of 16 N m
+        ("GRID,31,,7.,5.,5.\nRBE2,9,20,123456,31\nCONM2,10,31,,1.\nSPC1,1,12345,20\n"
+         "CELAS2,11,16.,20,6\n", [2.0]),
+        ("GRID,31,,7.,5.,5.\nRBAR,9,20,31,123456\nCONM2,10,31,,1.\nSPC1,1,12345,20\n"
+         "CELAS2,11,16.,20,6\n", [2.0]),
+        # the mean of two masses, one on a spring each, moves a third: (k1 + k2)/(m + 4 m3/4)
+        ("GRID,31,,6.,5.,5.\nSPC1,1,23,20,31\nMPC,4,40,1,-2.,20,1,1.\n,,31,1,1.\n"
+         "GRID,40,,5.5,5.,5.\nSPC1,1,23,40\nCONM2,10,40,,4.\nCELAS2,11,8.,20,1\n"
+         "CELAS2,12,8.,31,1\nMPC,4,20,1,1.,31,1,-1.\n", [2.0]),
+    ],
+)  # fmt: skip
+def test_masses_and_springs_swing_as_they_should(tmp_path, cards, expected):
+    mesh = read(tmp_path, f"GRID,20,,5.,5.,5.\n{cards}{HELD}", "SPC = 1\nMPC = 4")
+    omega = np.sort(2.0 * np.pi * hz(assembled(mesh)))
+    np.testing.assert_allclose(omega, np.sort(expected), rtol=1e-9)
+
+
+def test_an_averaging_element_moves_with_the_rigid_body_and_with_the_weighted_mean(tmp_path):
+    mesh = read(tmp_path, "GRID,20,,.5,.5,3.\nRBE3,9,,20,123456,1.,123,5,6\n,7,3.,123,8\n", "")
+    at = {name: mesh.points[mesh.node(name)] for name in ("node 5", "node 6", "node 7", "node 8")}
+    centre, weights = np.array([0.5, 0.5, 3.0]), {name: 1.0 for name in at} | {"node 8": 3.0}
+    rng = np.random.default_rng(3)
+    shift, turn = rng.normal(size=(2, 3))
+    moved = {name: shift + np.cross(turn, place - centre) for name, place in at.items()}
+    expected = dict(zip(AXES, [*shift, *turn], strict=True))
+    for equation in mesh.attachments.equations:
+        (point, way, own), *others = equation.terms
+        assert point == "node 20"
+        found = -sum(c * moved[p]["xyz".index(d)] for p, d, c in others) / own
+        assert found == pytest.approx(expected[way], abs=1e-12)
+    # the force on the mean is shared by weight, where it acts at their weighted centre
+    z = next(e for e in mesh.attachments.equations if e.terms[0][1] == "z").terms
+    shares = {p: -c for p, d, c in z[1:] if d == "z"}
+    moment = sum(share * (at[p] - centre) for p, share in shares.items())[:2]
+    assert sum(shares.values()) == pytest.approx(1.0)
+    np.testing.assert_allclose(moment, 0.0, atol=1e-12)
+    least = sum(s**2 / weights[p] for p, s in shares.items())
+    even = dict.fromkeys(shares, 0.25)  # another sharing in balance costs more
+    assert least < sum(s**2 / weights[p] for p, s in even.items()) + 1e-12
+
+
+AXES = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
+
+
+def test_masses_off_their_points_and_with_products_of_inertia_are_whole_bodies(tmp_path):
+    """The rigid mass about the origin is that of a body at its place, by Steiner's theorem."""
+    inertia = np.array([[5.0, -1.0, -0.5], [-1.0, 6.0, -0.25], [-0.5, -0.25, 7.0]])
+    cards = (
+        "GRID,20,,5.,5.,5.\nRBE2,9,20,123456,1\n"
+        "CONM2,10,20,,3.,.1,.2,.3\n,5.,1.,6.,.5,.25,7.\n"
+        "CONM2,11,20,-1,2.,6.,5.,4.\n"
+        "CONM1,12,20,,1.,0.,1.,0.,0.\n,1.\n"
+    )
+    mesh = read(tmp_path, cards, "")
+    with_mass = assembled(mesh).rigid_mass
+    plain = assembled(read(tmp_path, "", "")).rigid_mass
+
+    def body(mass, place, own):
+        x, y, z = place
+        lever = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
+        to_centre = np.hstack([np.eye(3), lever])
+        found = mass * to_centre.T @ to_centre
+        found[3:, 3:] += own
+        return found
+
+    expected = body(3.0, (5.1, 5.2, 5.3), inertia) + body(2.0, (6.0, 5.0, 4.0), 0.0)
+    expected += body(1.0, (5.0, 5.0, 5.0), 0.0)
+    np.testing.assert_allclose(with_mass - plain, expected, rtol=1e-12, atol=1e-9)
+
+
+def test_dampers_of_all_kinds_make_one_damping_matrix(tmp_path):
+    cards = (
+        "GRID,20,,5.,5.,5.\nGRID,21,,8.,5.,9.\nCONM2,9,20,,1.\nCELAS2,10,9.,20,1\n"
+        "CELAS2,14,9.,20,2\nCELAS2,15,9.,20,3\nSPC1,1,123,21\n"
+        "CDAMP2,11,.5,20,1\nPDAMP,3,.25\nCDAMP1,12,3,20,2\nPVISC,4,2.\nCVISC,13,4,20,21\n"
+        "PBUSH,5,B,1.\nCBUSH,16,5,20,,,,,0\n"
+    )
+    along = np.array([0.6, 0.0, 0.8])
+    expected = np.diag([1.5, 0.25, 0.0]) + 2.0 * np.outer(along, along)
+    found = assembled(read(tmp_path, cards + HELD)).damping.toarray()
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_the_analysis_set_is_a_set_of_points(tmp_path):
+    mesh = read(tmp_path, "ASET,1,3,5,123\nASET1,123,7,THRU,8\n")
+    assert mesh.nodes("ASET").tolist() == [0, 4, 6, 7]
+
+
+def test_supports_alone_do_not_forbid_another_unit(tmp_path):
+    mesh = read(tmp_path, "SPC1,1,123,1,2\n")
+    assert mesh.attachments and not mesh.attachments.measured
