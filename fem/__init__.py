@@ -30,6 +30,7 @@ from fem.model.calibrate import Calibration, calibrate
 from fem.model.described import parts_of
 from fem.model.frame import FrameModel
 from fem.model.parts import BeamPart, Material, ShellPart, SolidPart, TrussPart
+from fem.model.plates import Layer, PlateSection, layered
 from fem.model.sections import (
     CircularSection,
     CrossSection,
@@ -56,6 +57,7 @@ __all__ = [
     "Hinge",
     "Interface",
     "JointWarning",
+    "Layer",
     "LeftOut",
     "LinearEquation",
     "LinearSection",
@@ -65,6 +67,7 @@ __all__ = [
     "Material",
     "ModelError",
     "Pieces",
+    "PlateSection",
     "PointMass",
     "PointMatrix",
     "PointSpring",
@@ -85,6 +88,7 @@ __all__ = [
     "frame_mesh",
     "from_meshio",
     "joined",
+    "layered",
     "mass_properties",
     "node_at",
     "nodes_inside",

@@ -113,8 +113,15 @@ def rotation_stiffness(
     corners: FloatArray, area: FloatArray, law: FloatArray, poissons_ratio: float
 ) -> FloatArray:
     """Stiffness (e, 3, 3) against the corners' rotations less that of the triangle."""
-    natural = split_strains(from_edges(corners))
-    weight = max((1.0 - 4.0 * poissons_ratio**2) / 2.0, LEAST_WEIGHT)
+    natural = np.sqrt(law)[:, None] * split_strains(from_edges(corners))
+    return turning_stiffness(corners, area, natural, np.full(len(area), poissons_ratio))
+
+
+def turning_stiffness(
+    corners: FloatArray, area: FloatArray, natural: FloatArray, poissons_ratio: FloatArray
+) -> FloatArray:
+    """The same from rows (e, 3, 3) of strains along the edges whose squares are the energy."""
+    weight = np.maximum((1.0 - 4.0 * poissons_ratio**2) / 2.0, LEAST_WEIGHT)
     sides = corners[:, [1, 2, 0]] - corners[:, [0, 1, 2]]
     scale = (2.0 * area[:, None] / 3.0) / np.sum(sides**2, axis=2)
     beta = np.array(COEFFICIENTS)
@@ -122,8 +129,8 @@ def rotation_stiffness(
     found = np.zeros((len(corners), 3, 3))
     for first, second in ((0, 1), (1, 2), (2, 0)):
         rows = natural @ ((Q[first] + Q[second]) / 2.0)
-        found += np.einsum("eri,r,erj->eij", rows, law, rows)
-    return np.asarray(0.75 * weight * area[:, None, None] * found, dtype=np.float64)
+        found += rows.transpose(0, 2, 1) @ rows
+    return np.asarray(0.75 * (weight * area)[:, None, None] * found, dtype=np.float64)
 
 
 def from_edges(corners: FloatArray) -> FloatArray:

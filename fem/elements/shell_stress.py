@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fem.base.arrays import FloatArray, IntArray
+from fem.base.errors import ModelError
 from fem.elements.shells import TRIANGLES, shell_rows
 from fem.mesh.cells import CellKind
 from fem.model.parts import ShellPart
@@ -29,6 +30,8 @@ def outer_stress(
     shape
         Six displacements of every node of the mesh, shape (n, 6).
     """
+    if part.section is not None:
+        raise ModelError("stress is not computed in shells with layers or a section of their own")
     rows, weights = shell_rows(part, kind, points, nodes, normals)
     found = np.einsum("erj,ej->er", rows, shape[nodes].reshape(len(nodes), -1))
     pieces = TRIANGLES[kind.name]

@@ -12,6 +12,7 @@ from skfem.quadrature import get_quadrature
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
 from fem.elements.beams import cross_matrix
+from fem.elements.laminates import section_rows
 from fem.elements.membranes import areas, membrane_rows, plane_law
 from fem.elements.plates import jacobians, plate_rows
 from fem.mesh.cells import CellKind
@@ -110,10 +111,31 @@ def node_matrices(part: ShellPart, cells: FlatCells) -> FloatArray:
     return T
 
 
+def section_angles(part: ShellPart, cells: FlatCells) -> FloatArray:
+    """Angles (e,) in radians from the x axes of facets to those of a part's section."""
+    if isinstance(part.direction, tuple):
+        x, y = np.moveaxis(cells.axes[:, :2] @ np.array(part.direction), -1, 0)
+        if not (np.hypot(x, y) > 0.0).all():
+            raise ModelError(f"shell part: a cell lies across its direction {part.direction}")
+        return np.asarray(np.arctan2(y, x))
+    side = cells.plane[:, 1] - cells.plane[:, 0]
+    return np.asarray(np.arctan2(side[:, 1], side[:, 0]) + np.radians(part.direction))
+
+
 def local_rows(
-    part: ShellPart, kind: CellKind, plane: FloatArray, reduction: FloatArray
+    part: ShellPart,
+    kind: CellKind,
+    plane: FloatArray,
+    reduction: FloatArray,
+    angles: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Deformations (e, r, b, 6) of flat facets and their stiffness (e, r), in local axes."""
+    if part.section is not None:
+        places, weights = get_quadrature(kind.element, ORDERS[kind.name])
+        pieces = TRIANGLES[kind.name]
+        return section_rows(
+            part.section, kind, plane, angles, pieces, (places.T, weights), reduction
+        )
     nu = part.material.poissons_ratio_for("shell part")
     count, b = plane.shape[:2]
     rows, stiffness = [], []
@@ -143,16 +165,16 @@ def local_mass(part: ShellPart, kind: CellKind, plane: FloatArray) -> FloatArray
     J = jacobians(kind, plane, places.T)
     volume = np.linalg.det(J) * weights
     products = np.einsum("eq,qa,qc->eac", volume, values, values, optimize=True)
-    density, t = part.material.density, part.thickness
+    mass, inertia = part.mass, part.inertia
     count, b = plane.shape[:2]
     M = np.zeros((count, b, 6, b, 6))
     for axis in range(5):
-        M[:, :, axis, :, axis] = density * (t if axis < 3 else t**3 / 12.0) * products
+        M[:, :, axis, :, axis] = (mass if axis < 3 else inertia) * products
     turn = np.zeros((count, len(weights), b, 6))
     gradient = np.matmul(slopes, np.linalg.inv(J))
     turn[..., 0], turn[..., 1] = gradient[..., 1] / 2.0, -gradient[..., 0] / 2.0
     turn[..., 5] = values
-    M += np.einsum("eq,eqai,eqcj->eaicj", density * t**3 / 12.0 * volume, turn, turn, optimize=True)
+    M += np.einsum("eq,eqai,eqcj->eaicj", inertia * volume, turn, turn, optimize=True)
     return M
 
 
@@ -246,7 +268,7 @@ def shell_rows(
     """
     cells = flat_cells(points[nodes])
     reduction = curvature_reduction(part, cells, normals) * slant_reduction(cells.plane)
-    rows, stiffness = local_rows(part, kind, cells.plane, reduction)
+    rows, stiffness = local_rows(part, kind, cells.plane, reduction, section_angles(part, cells))
     found = np.matmul(rows.transpose(0, 2, 1, 3), node_matrices(part, cells))
     return found.transpose(0, 2, 1, 3).reshape(*stiffness.shape, -1), stiffness
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from fem.base.errors import ModelError, check_positive, is_finite, quoted
 from fem.mesh.attachments import vector
+from fem.model.plates import PlateSection
 from fem.model.sections import (
     CircularSection,
     CrossSection,
@@ -272,6 +273,12 @@ class ShellPart:
     offset
         Place in m of the middle surface as seen from the nodes, along the normal of the cells:
         right-handed about it their nodes are in order.
+    section
+        Stiffness and mass with directions or layers; the material and the thickness then are only
+        for pictures and checks.
+    direction
+        Of the x axis of the section: a vector (x, y, z), whose part in each cell counts, or an
+        angle in degrees from the side between the first two nodes of each cell.
 
     Examples
     --------
@@ -282,14 +289,35 @@ class ShellPart:
     material: Material
     thickness: float
     offset: float = 0.0
+    section: PlateSection | None = None
+    direction: float | Sequence[float] = 0.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.material, Material):
             raise ModelError(f"part: material must be a Material, not {self.material!r}")
         self.material.poissons_ratio_for("shell part")
+        if not (self.section is None or isinstance(self.section, PlateSection)):
+            raise ModelError(f"shell part: section must be a PlateSection, not {self.section!r}")
+        if isinstance(self.direction, Sequence):
+            way = vector("shell part: direction", self.direction, 3)
+            object.__setattr__(self, "direction", way)
+        elif not is_finite(self.direction):
+            raise ModelError(f"shell part: direction must be an angle, not {self.direction!r}")
         check_positive("shell part", thickness=self.thickness)
         if not is_finite(self.offset):
             raise ModelError(f"shell part: offset must be finite, not {self.offset!r}")
+
+    @property
+    def mass(self) -> float:
+        """In kg/m²."""
+        return self.material.density * self.thickness if self.section is None else self.section.mass
+
+    @property
+    def inertia(self) -> float:
+        """Of turning fibres, in kg."""
+        if self.section is not None:
+            return self.section.inertia
+        return self.material.density * self.thickness**3 / 12.0
 
     @property
     def stretching(self) -> float:

@@ -28,6 +28,7 @@ from fem.mesh.structure_mesh import StructureMesh
 from fem.model.frame import LISTS as FRAME_LISTS
 from fem.model.frame import FrameModel
 from fem.model.parts import BeamPart, Material, ShellPart, SolidPart, TrussPart
+from fem.model.plates import PlateSection
 from fem.model.sections import (
     CircularSection,
     CrossSection,
@@ -242,6 +243,8 @@ def _part_from(plain: dict[str, Any]) -> Any:
     sort = PARTS[plain.pop("part")]
     if sort is BeamPart:
         plain["section"] = _section_from(plain["section"])
+    elif plain.get("section") is not None:
+        plain["section"] = PlateSection(**plain["section"])
     return sort(**plain)
 
 

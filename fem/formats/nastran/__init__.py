@@ -21,6 +21,7 @@ from fem.formats.nastran.materials import Materials
 from fem.formats.nastran.points import read_points
 from fem.formats.nastran.rigid import mark_turning, read_rigid
 from fem.formats.nastran.rods import read_rods, twist_rods
+from fem.formats.nastran.shells import read_shells
 from fem.formats.nastran.solids import read_solids
 from fem.formats.nastran.supports import read_supports
 from fem.mesh.attachments import Attachments, LeftOut
@@ -108,6 +109,7 @@ def read_nastran(
     gathered = Gathered(deck)
     materials = Materials(deck, deck.by_number("MAT1", "MAT2", "MAT8", "MAT9"), factor)
     read_solids(gathered, materials)
+    read_shells(gathered, materials)
     read_beams(gathered, materials)
     rods = read_rods(gathered, materials)
     if not gathered.cells:

@@ -21,6 +21,7 @@ from fem.model.sections import LinearSection, Section
 PROPERTIES = {"CBAR": ("PBAR", "PBARL"), "CBEAM": ("PBEAM", "PBEAML", "PBCOMP")}
 DEFAULTS = {"CBAR": "BAROR", "CBEAM": "BEAMOR"}
 RIGID = 1e8  # shear area over area of a beam without shear deformation in one of two directions
+LEAST_TORSION = 1e-12  # of the polar moment: J of a beam that does not resist torsion
 LIKELY = (-0.9, 0.499)
 """Poisson's ratios that a material may have; else the section carries the shear modulus."""
 
@@ -69,7 +70,7 @@ def _read_line(gathered: Gathered, card: Card, lines: _Lines) -> None:
     deck = gathered.deck
     grids = [card.whole(2), card.whole(3)]
     ends = [deck.place(grid, card) for grid in grids]
-    systems = (card.text(7) or "GGG").ljust(3, "G") if not card.is_real(7) else "GGG"
+    systems = (re.sub(r"^[012]$", "", card.text(7)) or "GGG").ljust(3, "G")  # 1 and 2: old form
     if not re.fullmatch(r"[GB][GO][GO]", systems):
         raise card.fail(f"{systems!r} in field 9 is not three letters out of G, O and B")
     offsets = []
@@ -160,6 +161,7 @@ def _section(card: Card, numbers: BeamNumbers, end: int, factor: float) -> tuple
         angle = 0.5 * np.arctan2(2.0 * mixed, first - second)
         mean, half = (first + second) / 2.0, np.hypot((first - second) / 2.0, mixed)
         first, second = mean + half, mean - half
+    torsion = torsion or LEAST_TORSION * (first + second)
     named = {"A": area, "I1": first, "I2": second, "J": torsion}
     wrong = [name for name, value in named.items() if not value > 0.0]
     if wrong:

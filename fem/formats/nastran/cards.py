@@ -14,6 +14,8 @@ from fem.formats.abaqus.keywords import decoded
 REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[ED]?([+-]\d+)|[ED](\d+))?", re.IGNORECASE)
 WHOLE = re.compile(r"[+-]?\d+")
 MOST_INCLUDED = 200  # files, each counted as often as it is included
+EQUATION = "DEQATN"
+"""A card whose fields are text."""
 MARK = re.compile(r"[+*]\S+")
 Given = TypeVar("Given")
 
@@ -191,9 +193,17 @@ def cards_of(lines: Sequence[Line], source: Path) -> Iterator[Card]:
     """
     card: Card | None = None
     for line in lines:
+        if (name := line.text[:8].strip().upper())[:6] == EQUATION:
+            if card is not None:
+                yield card
+            card = Card(EQUATION, [name], line, source)
+            continue
+        if card is not None and card.name == EQUATION and line.text[0] in " +*,":
+            continue  # its text goes on
         first, fields, rest = _fields(line.text)
         where = f"{source}: {line.place(source)}"
-        if any(re.match(r"[\d.-]", word) for word in rest) or any(rest[1:]):
+        free = "," in line.text
+        if any(re.match(r"[\d.-]", word) for word in rest if free) or any(rest[1:]):
             raise ModelError(f"{where} has more fields than a line can have")
         mark = rest[0] if rest else ""
         if first.upper().rstrip("*") == "ENDDATA":
@@ -201,7 +211,7 @@ def cards_of(lines: Sequence[Line], source: Path) -> Iterator[Card]:
         if not first or first[0] in "+*":
             if card is None:
                 raise ModelError(f"{where} goes on with a card that is not there")
-            if MARK.fullmatch(first) and MARK.fullmatch(card.mark) and first[1:] != card.mark[1:]:
+            if MARK.fullmatch(first) and MARK.fullmatch(card.mark) and not _alike(first, card.mark):
                 raise ModelError(
                     f"{where} goes on with the mark {first!r}, but {card.name} before it has"
                     f" {card.mark!r}; put the lines of a card one below the other"
@@ -214,6 +224,10 @@ def cards_of(lines: Sequence[Line], source: Path) -> Iterator[Card]:
         card = Card(first.upper().rstrip("*"), fields, line, source, mark)
     if card is not None:
         yield card
+
+
+def _alike(first: str, mark: str) -> bool:
+    return first[1:].upper() == mark[1:].upper()
 
 
 def _fields(line: str) -> tuple[str, list[str], list[str]]:

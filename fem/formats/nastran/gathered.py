@@ -57,15 +57,16 @@ class Gathered:
     equations: list[LinearEquation] = field(default_factory=list)
     supports: list[Support] = field(default_factory=list)
     matrices: list[PointMatrix] = field(default_factory=list)
-    elements: dict[int, Card] = field(default_factory=dict)
+    elements: dict[tuple[bool, int], Card] = field(default_factory=dict)
     joined: set[int] = field(default_factory=set)
 
     def add_element(self, card: Card) -> int:
-        """The number of an element, which may stand once only."""
+        """The number of an element, which may stand once only among those of its sort."""
         number = card.whole(0)
-        if number in self.elements:
+        key = (card.name[0] == "R", number)  # rigid elements have numbers of their own
+        if key in self.elements:
             raise card.fail(f"element {number} is defined twice")
-        self.elements[number] = card
+        self.elements[key] = card
         return number
 
     def add_cell(self, card: Card, kind: str, grids: Sequence[int], group: str) -> int:

@@ -21,11 +21,11 @@ def two_bars(**rest):
     ("make", "sentence"),
     [
         (lambda: fem.Material(0.0, 1.0), "material: youngs_modulus must be positive"),
-        (lambda: fem.Material(1.0, math.nan), "material: density must be positive and finite"),
+        (lambda: fem.Material(1.0, math.nan), "material: density must be finite and not negative"),
         (lambda: fem.Material("a", 1.0), "material: youngs_modulus must be .* not 'a'"),
         (lambda: fem.Material(None, 1.0), "material: youngs_modulus must be .* not None"),
         (lambda: fem.Material(1.0, True), "material: density must be .* not True"),
-        (lambda: fem.Material(1.0, 10**400), "material: density must be positive and finite"),
+        (lambda: fem.Material(1.0, 10**400), "material: density must be finite and not negative"),
         (lambda: fem.CircularSection(0.1, bore="b"), "circular section: bore .* not 'b'"),
         (lambda: fem.PointMass("tip", "m"), "point mass at 'tip': mass must be finite .* not 'm'"),
         (lambda: fem.PointSpring("tip", "y", "k"), "spring at 'tip': stiffness .* not 'k'"),
