@@ -195,8 +195,10 @@ def layered(
         mass += layer.density * (z1 - z0)
         inertia += layer.density * ((z1 - middle) ** 3 - (z0 - middle) ** 3) / 3.0
     shear = _shear_stiffness(layers, laws, faces)
-    made = [((m + m.T) / 2.0).tolist() for m in (A, B, D)]
-    return PlateSection(*made, shear.tolist(), mass + added_mass, inertia)
+    A, B, D = ((m + m.T) / 2.0 for m in (A, B, D))
+    return PlateSection(
+        A.tolist(), B.tolist(), D.tolist(), shear.tolist(), mass + added_mass, inertia
+    )
 
 
 def _shear_stiffness(
