@@ -284,7 +284,12 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
             build_system,
             join,
         )
-        from nldyn.scene.checks import check_computable, remarks
+        from nldyn.scene.checks import (
+            check_computable,
+            check_held_to_follow,
+            only_simulated,
+            remarks,
+        )
         from nldyn.scene.faults import told_as
         from nldyn.scene.read import load_scene
 
@@ -303,12 +308,17 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
             system = build_system(loaded, reduced)
             with told_as(loaded, (), SystemModelError):
                 at_rest = describe_rest(system)
-        highest_hz = float(system.frequencies_hz.max())
+
+        def check_run() -> None:
+            if not only_simulated(loaded):
+                check_computable(loaded, scene)
+                check_held_to_follow(loaded, system)
+
         if as_json:
             from nldyn.report.modes import mode_table
             from nldyn.scene.build import Structure
 
-            check_computable(loaded, scene)
+            check_run()
             table = mode_table(loaded, Structure(component, reduced))
             count = sum(part.mass.shape[0] for part in parts.values()) or None
             print_json({
@@ -319,21 +329,22 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
                 "modes": table.as_json(),
                 **described_as_json(system),
                 "at_rest": at_rest,
-                "notes": remarks(loaded, highest_hz),
+                "notes": remarks(loaded, system),
             })  # fmt: skip
             return
         echo_parts(parts)
         described = describe_system(system, 0 if reduced is None else reduced.residual_modes)
         click.echo("\n".join([described, *at_rest]))
-        check_computable(loaded, scene)
+        check_run()
         if candidates is not None and loaded.reduction is not None:
             click.echo(
                 f"modes up to {candidates.cutoff_hz:.4g} Hz may matter; of these, 'nldyn run' "
                 f"keeps as many as tolerance = {loaded.reduction.tolerance:g} needs"
             )
-        for remark in remarks(loaded, highest_hz):
+        for remark in remarks(loaded, system):
             click.echo(f"note: {remark}")
-        click.echo(f"{scene}: no fault found")
+        use = " for 'nldyn simulate'" if only_simulated(loaded) else ""
+        click.echo(f"{scene}: no fault found{use}")
 
 
 @main.command()

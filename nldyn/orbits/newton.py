@@ -12,12 +12,11 @@ from nldyn.base.errors import ConvergenceError, SystemModelError, numbers
 from nldyn.flow.flow_map import FlowMap, Trajectory
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import ShootingProblem
-from nldyn.system.system import System
+from nldyn.system.system import NOT_HELD, System
 
 # contact force over the excitation, and penetration over displacement, up to which a free body
 # counts as untouched
 TOUCH = 1e-7
-NOT_HELD = "the structure is free to move in a way that no stop limits, and nothing tells its place"
 TOUCH_ONE = "give a guess that touches one"
 NO_PLACE = (
     "the structure is free to move as a whole, and where the motion touches no stop, nothing tells "

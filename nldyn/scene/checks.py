@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 from nldyn.base.errors import SceneError, must_be_symmetric
 from nldyn.scene.messages import KeyPath, joined, scene_error, show, unknown_name
 from nldyn.scene.schema import Matrix, Scene
+from nldyn.system.system import NOT_HELD, System
 
 SOUND = (10.0, 3e4)  # speeds in m/s, below those of soft rubber and above that of diamond
 
 Report = Callable[[KeyPath, str], SceneError]
+STEADY = ("constant", "weight")  # kinds of loads that do not change in time
+MANY_OSCILLATIONS = 1000.0  # in a period: 1700 take four times as long as 170
 LONGEST_NAME, LONGEST_TITLE = 100, 1000
 NAMED_BY = (
     "the file has no names; they are physical groups in .msh, arrays 'set:NAME' in .vtu and .vtk,"
@@ -124,9 +127,11 @@ def check_structure_names(scene: Scene, mesh: TaggedStructure, file: Path) -> No
 
 def check_computable(scene: Scene, file: Path) -> None:
     """Check that the scene says what excites the structure and which range to follow."""
-    if not any(table.kind not in ("constant", "weight") for table in scene.excitation):
-        fault = "is missing" if not scene.excitation else "is constant"
-        raise scene_error(file, ("excitation",), f"{fault}: nothing moves the structure")
+    if not any(table.kind not in STEADY for table in scene.excitation):
+        fault = "is missing: nothing moves the structure"
+        if scene.excitation:
+            fault = "is constant: there is no branch to follow, but 'nldyn simulate' takes it"
+        raise scene_error(file, ("excitation",), fault)
     for number, table in enumerate(scene.excitation):
         if table.frequency_hz is not None:
             fault = "leaves no motion a period, so that no branch can be followed: simulate it by "
@@ -138,10 +143,42 @@ def check_computable(scene: Scene, file: Path) -> None:
         raise scene_error(file, ("continuation",), fault)
 
 
-def remarks(scene: Scene, highest_hz: float) -> list[str]:
-    """Say what is possible but looks like a mistake in the units."""
-    beyond = _range_remark(scene, highest_hz)
-    return [*_material_remarks(scene), *([beyond] if beyond else [])]
+def only_simulated(scene: Scene) -> bool:
+    """Whether a scene is meant for ``nldyn simulate``: no range, and loads that have no period."""
+    steady = all(table.kind in STEADY for table in scene.excitation)
+    several = any(table.frequency_hz is not None for table in scene.excitation)
+    return scene.continuation is None and bool(scene.excitation) and (steady or several)
+
+
+def check_held_to_follow(scene: Scene, system: System) -> None:
+    """Refuse a structure that nothing holds, whose branches cannot be followed."""
+    if system.left_free and system.circulatory is None:
+        fault = f"{NOT_HELD}: hold it by a support, a spring or a stop, or simulate it"
+        raise scene_error(scene.file, (), fault)
+
+
+def remarks(scene: Scene, system: System) -> list[str]:
+    """Say what is possible but looks like a mistake in the units, or takes long."""
+    beyond = _range_remark(scene, float(system.frequencies_hz.max()))
+    return [*_material_remarks(scene), *([beyond] if beyond else []), *_slow_remarks(scene, system)]
+
+
+def _slow_remarks(scene: Scene, system: System) -> Iterator[str]:
+    """Name what makes a computation many times as long, or endless."""
+    if scene.continuation is None or system.left_free:
+        return
+    if system.conservative:
+        yield (
+            "nothing takes energy out, for there is neither [damping] nor a damper: motions do not "
+            "settle, and 'nldyn run' takes many times as long as with damping"
+        )
+    lowest, highest = min(scene.continuation.range_hz), float(system.frequencies_hz.max())
+    if highest > MANY_OSCILLATIONS * lowest:
+        yield (
+            f"one period at {lowest:g} Hz, where range_hz begins, holds {highest / lowest:.0f} "
+            f"oscillations of the mode at {highest:.4g} Hz, and the time that a branch takes grows "
+            "with their number: keep fewer modes, or begin higher"
+        )
 
 
 def _material_remarks(scene: Scene) -> Iterator[str]:

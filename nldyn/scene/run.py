@@ -9,10 +9,9 @@ from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.io.checkpoint import CheckpointFile
-from nldyn.orbits.newton import NOT_HELD
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.scene.build import Structure, build_structure, build_system
-from nldyn.scene.checks import check_computable, remarks
+from nldyn.scene.checks import check_computable, check_held_to_follow, remarks
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import ContinuationTable, Scene
@@ -194,9 +193,7 @@ def _to_follow(scene: Scene, structure: Structure) -> tuple[FlowMap, Continuatio
     system = build_system(scene, structure.reduced)
     table = scene.continuation
     assert table is not None
-    if system.left_free and system.circulatory is None:
-        fault = f"{NOT_HELD}: hold it by a support, a spring or a stop, or simulate it"
-        raise scene_error(scene.file, (), fault)
+    check_held_to_follow(scene, system)
     with told_as(scene, ("continuation",), SystemModelError):
         if system.bonds:  # searches start where it rests
             rest_positions(system)
@@ -204,6 +201,6 @@ def _to_follow(scene: Scene, structure: Structure) -> tuple[FlowMap, Continuatio
 
 
 def _remarked(scene: Scene, flow: FlowMap, found: Diagram) -> Diagram:
-    """A diagram with notes on what looks like a mistake in the units."""
-    said = remarks(scene, float(flow.system.frequencies_hz.max()))
+    """A diagram with notes on what looks like a mistake in the units, or takes long."""
+    said = remarks(scene, flow.system)
     return replace(found, notes=(*found.notes, *said)) if said else found

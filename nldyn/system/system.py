@@ -43,6 +43,7 @@ AnySpring = Spring | PolynomialSpring
 AnyDamper = Damper | CubicDamper
 LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
 NEGATIVE = 1e-10  # of a stiffness with a unit diagonal: an eigenvalue that is not rounding
+NOT_HELD = "the structure is free to move in a way that no stop limits, and nothing tells its place"
 FEW = 8.0  # roundings of each mode in the largest ω²
 
 

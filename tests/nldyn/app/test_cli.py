@@ -271,6 +271,62 @@ def test_a_range_above_the_modes_of_a_mesh_is_remarked(tmp_path):
         assert "no fault found" in said
 
 
+FREE = """
+[modal]
+frequencies_hz = [0.0, 20.0]
+participation.tip = [1.0, 0.5]
+[damping]
+modal_ratio = 0.01
+[[excitation]]
+at = "tip"
+kind = "harmonic"
+amplitude = 1.0
+[continuation]
+range_hz = [10.0, 30.0]
+"""
+
+
+def test_check_refuses_what_run_refuses_in_the_same_words(tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(FREE)
+    checked = invoke("check", scene)
+    ran = invoke("run", scene, "--out", tmp_path / "out", "--quiet")
+    assert checked.exit_code == ran.exit_code == 2
+    assert checked.stderr == ran.stderr and "free to move" in checked.stderr
+    assert "no fault" not in checked.stdout
+
+
+def test_check_takes_a_constant_force_that_is_only_simulated(tmp_path):
+    """With a range of frequencies it is meant to be followed, which it cannot be."""
+    scene = tmp_path / "scene.toml"
+    step = FREE.replace('"harmonic"\namplitude', '"constant"\nforce').replace("[0.0,", "[10.0,")
+    scene.write_text(step[: step.index("[continuation]")])
+    checked = invoke("check", scene)
+    assert checked.exit_code == 0 and "no fault found for 'nldyn simulate'" in checked.stdout
+    done = invoke(
+        "simulate", scene, "--out", tmp_path / "out", "--frequency-hz", 10, "--periods", 2
+    )
+    assert done.exit_code == 0
+    scene.write_text(step)
+    refused = invoke("check", scene)
+    assert refused.exit_code == 2 and "excitation is constant" in refused.stderr
+
+
+def test_check_names_what_takes_long(tmp_path):
+    """No damping, and modes that swing thousands of times in a period."""
+    scene = tmp_path / "scene.toml"
+    held = FREE.replace("[0.0,", "[12.0,")
+    for text, notes in (
+        (held, ()),
+        (held.replace("modal_ratio = 0.01", "modal_ratio = 0.0"), ("nothing takes energy out",)),
+        (held.replace("20.0]", "20000.0]"), ("holds 2000 oscillations of the mode at 2e+04 Hz",)),
+    ):
+        scene.write_text(text)
+        said = [line for line in invoke("check", scene).stdout.splitlines() if "note:" in line]
+        assert len(said) == len(notes)
+        assert all(note in line for note, line in zip(notes, said, strict=True))
+
+
 def test_check_tells_the_residual_mode_from_the_others():
     """The two-DOF model has one of each."""
     lines = invoke("check", example("two_dof_xi_0.01.toml")).stdout.splitlines()

@@ -155,7 +155,7 @@ def test_what_is_left_out_of_a_measured_force_is_told():
     ("excitation", "words"),
     [
         ('kind = "constant"\nat = "x"', "needs 'force'"),
-        ('kind = "constant"\nat = "x"\nforce = 1.0', "constant: nothing moves"),
+        ('kind = "constant"\nat = "x"\nforce = 1.0', "is constant: there is no branch"),
         ('kind = "constant"\nat = "y"\nforce = 1.0', "interface or load vector"),
         ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nharmonic = 0', "harmonic"),
         ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nharmonic = 1.5', "1.5: all .* whole cycle"),
