@@ -43,6 +43,8 @@ from nldyn.base.exit_codes import BAD_INPUT, INTERRUPTED, NO_GRAPHICS, NOTHING_F
 from nldyn.report.console import kept_at_interrupt, plain_errors, told_what_is_kept
 from nldyn.runtime.interruption import STOPPED, interrupted
 
+UNCUT = 10_000  # letters of a summary
+
 if TYPE_CHECKING:
     from nldyn.longterm.basins import PlaneState
     from nldyn.scene.build import Structure
@@ -60,6 +62,12 @@ def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
 
 class PlainGroup(click.Group):
     """Commands that tell a fault on their command line in one sentence, without their usage."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the commands with the first sentence of each, uncut."""
+        rows = [(name, each.get_short_help_str(UNCUT)) for name, each in self.commands.items()]
+        with formatter.section("Commands"):
+            formatter.write_dl(sorted(rows))
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the options that stand before the command."""
@@ -126,7 +134,11 @@ def main() -> None:
 @out_option
 @mesh_option
 @click.option("--log", is_flag=True, help="Draw the displacement on a logarithmic axis.")
-@replace_option
+@click.option(
+    "--replace",
+    is_flag=True,
+    help="Compute anew, also where DIR holds finished results of this scene or of another one.",
+)
 @json_option
 @quiet_option
 @jobs_option
@@ -142,7 +154,8 @@ def run(
 ) -> None:
     """Compute the branches of a scene, and write tables, a diagram and a report.
 
-    The report is one page for a browser, report.html.
+    The report is one page for a browser, report.html. What DIR holds of the same scene, finished,
+    is not computed again.
     """
     with plain_errors():
         from nldyn.runtime.progress import progress_line
@@ -152,9 +165,10 @@ def run(
         loaded = load_scene(scene, mesh_folders)
         check_results(out, loaded, replace)
         from nldyn.io.checkpoint import CheckpointFile
-        from nldyn.report.again import drawn_of
+        from nldyn.report.again import computed_before, drawn_of
         from nldyn.report.results import write_results
         from nldyn.scene.run import compute, explore_scene, parts_of_work, structure_of
+        from nldyn.search.exploration import Exploration
 
         with kept_at_interrupt(out) as unfinished:
             kept = CheckpointFile(unfinished)
@@ -162,14 +176,17 @@ def run(
                 parts = parts_of_work(loaded, line)
                 structure = structure_of(loaded, parts.part("model"))
                 parts.end("model")
+                before = None if replace else computed_before(out, loaded, structure)
                 work = (loaded, parts.part("branches"), kept, jobs, structure)
-                found = explore_scene(*work) if loaded.explore else None
-                diagram = found.diagram if found else compute(*work)
-                line("report", 0.0, 1.0)
-                yscale: Literal["linear", "log"] = "log" if log else "linear"
-                drawn = drawn_of(loaded, structure)
-                write_results(found or diagram, out, loaded, drawn=drawn, yscale=yscale)
+                found = before or (explore_scene(*work) if loaded.explore else compute(*work))
+                if before is None or log:
+                    line("report", 0.0, 1.0)
+                    yscale: Literal["linear", "log"] = "log" if log else "linear"
+                    drawn = drawn_of(loaded, structure)
+                    write_results(found, out, loaded, drawn=drawn, yscale=yscale)
         seconds = time.perf_counter() - start
+        coverage = found.coverage_lines() if isinstance(found, Exploration) else []
+        diagram = found.diagram if isinstance(found, Exploration) else found
         if as_json:
             from nldyn.report.results import summary
 
@@ -180,14 +197,14 @@ def run(
                     "report": str(out / "report.html"),
                     "seconds": seconds,
                     "special_points": special_counts(diagram),
-                    "coverage": found.coverage_lines() if found else [],
+                    "coverage": coverage,
                     **summary(diagram),
                 }
             )
         else:
-            if found:
-                click.echo("\n".join(found.coverage_lines()))
-            click.echo(describe(diagram, seconds, out))
+            click.echo("\n".join([*coverage, describe(diagram, seconds, out)]))
+            if before is not None:
+                click.echo("all of it was computed before; '--replace' computes it anew")
         if not diagram.branches:
             click.echo("nldyn: no periodic orbit was found; the tables are empty", err=True)
             sys.exit(NOTHING_FOUND)
@@ -692,9 +709,14 @@ def basins(
     """
     with plain_errors():
         from nldyn.runtime.progress import progress_line
+        from nldyn.scene.messages import unknown_name
         from nldyn.scene.read import load_scene
 
         loaded = load_scene(scene, mesh_folders)
+        for option, state in (("'--x'", x), ("'--y'", y)):
+            if state is not None and state[1] not in loaded.interface_names:
+                fault = unknown_name(state[1], loaded.interface_names, "an interface")
+                raise click.BadParameter(fault, param_hint=option)
         check_results(out, loaded, replace)
         from nldyn.report.basins import write_basins
         from nldyn.scene.basins import basins_of

@@ -30,6 +30,7 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.prefetch import Ahead
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
+from nldyn.runtime.progress import of_frequency, shows_progress
 from nldyn.runtime.threads import one_thread
 
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
@@ -39,6 +40,7 @@ ALONG = 0.99  # least cosine between two tangents of a branch at one place
 MET_AGAIN = 1e-6  # longest Newton step by which a solved orbit is met again across its branch
 
 
+@shows_progress(of_frequency("branch"))
 def continue_branch(
     start: Orbit | Branch,
     range_hz: tuple[float, float] | None = None,

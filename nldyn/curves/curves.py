@@ -41,6 +41,7 @@ from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, gradien
 from nldyn.orbits.conditions import Held, Monitor, defined_by
 from nldyn.orbits.orbit import Orbit, check_minimal, same_orbit
 from nldyn.runtime.keeper import Keeper
+from nldyn.runtime.progress import of_place, shows_progress
 from nldyn.system.chart import Chart, checked_parameter, value_of
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
@@ -242,6 +243,7 @@ def _column_name(parameter: Parameter) -> str:
     return f"{parameter.name}_{parameter.index}" if parameter.index else parameter.name
 
 
+@shows_progress(of_place("curve"))
 def continue_orbit(
     orbit: Orbit,
     parameter: str | Parameter,
@@ -297,6 +299,7 @@ def continue_orbit(
     return _curve("orbit", start, options, progress, keeper)
 
 
+@shows_progress(of_place("curve"))
 def continue_special(
     special: Located,
     parameters: Sequence[str | Parameter],
@@ -373,6 +376,7 @@ def special_start(special: Located, charts: tuple[Chart, ...]) -> CurvePoint:
     return _start(family, orbit, condition)
 
 
+@shows_progress(of_place("curve"))
 def continue_constant(
     orbit: Orbit,
     monitor: Monitor,

@@ -39,6 +39,7 @@ from nldyn.orbits.orbit import Orbit, check_observe, same_orbit, stroboscopic
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import orbit_near, random_states, settling_periods
 from nldyn.runtime.executors import check_execution, values_of
+from nldyn.runtime.progress import of_number, shows_progress
 from nldyn.system.system import System
 
 Kind = Literal["periodic", "quasi-periodic", "chaotic", "drifting", "undecided", "failed"]
@@ -668,6 +669,7 @@ class Attractors(list[Share]):
         )
 
 
+@shows_progress(of_number("motions"))
 def find_attractors(
     system: System | FlowMap,
     frequency_hz: float,

@@ -38,6 +38,7 @@ from nldyn.longterm.neighbourhoods import CHUNK, UNDECIDED, Settled, Target, set
 from nldyn.orbits.newton import check_bounded
 from nldyn.orbits.orbit import check_observe
 from nldyn.runtime.executors import check_execution, values_of
+from nldyn.runtime.progress import of_number, shows_progress
 from nldyn.system.system import System, same_system
 
 CELLS = 250  # initial states in one computation
@@ -291,7 +292,7 @@ def _rows_of(system: System, x: PlaneState, y: PlaneState) -> Real:
             raise SystemModelError(f"plane: {axis} must be a state and an interface, got {state}")
         quantity, name = state
         check_choice(f"plane: {axis}", quantity, UNITS)
-        phi = system.participation[check_observe(system, name)]
+        phi = system.participation[check_observe(system, name, f"plane: {axis}")]
         if name in system.rides:
             raise SystemModelError(f"plane: '{name}' rides on a base; take the relative motion")
         if not np.any(phi):
@@ -459,6 +460,7 @@ class Basins:
         return float(np.min(cKDTree(others).query(points)[0]))
 
 
+@shows_progress(of_number("cells"))
 def basins(
     system: System | FlowMap,
     frequency_hz: float,

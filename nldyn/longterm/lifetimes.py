@@ -20,6 +20,7 @@ from nldyn.longterm.lyapunov import spectrum_from
 from nldyn.longterm.simulation import MOST_PERIODS
 from nldyn.orbits.orbit import check_observe
 from nldyn.runtime.executors import check_execution, values_of
+from nldyn.runtime.progress import of_number, shows_progress
 
 LOOK = 250  # periods between two looks whether a motion has settled
 LAST = 500  # periods at the end over which exponents tell whether it is chaotic still
@@ -124,6 +125,7 @@ def two_digits(value: float) -> str:
     return f"{float(f'{value:.2g}'):.0f}"
 
 
+@shows_progress(of_number("motions"))
 def chaos_lifetime(
     attractor: Attractor,
     *,

@@ -24,6 +24,7 @@ from nldyn.longterm.simulation import (
 )
 from nldyn.orbits.orbit import contact_damping
 from nldyn.runtime.executors import check_execution, values_of
+from nldyn.runtime.progress import of_number, shows_progress
 from nldyn.system.system import System
 
 BLOCK = 64  # periods in one call
@@ -166,6 +167,7 @@ def lyapunov_exponents(
 ) -> list[LyapunovSpectrum]: ...
 
 
+@shows_progress(of_number("motions"))
 def lyapunov_exponents(
     system: System | FlowMap,
     frequency_hz: float | Sequence[float] | Real,

@@ -17,6 +17,7 @@ from nldyn.longterm.neighbourhoods import UNDECIDED, Target, settle, target_of
 from nldyn.orbits.orbit import Orbit, same_orbit, stroboscopic
 from nldyn.orbits.starts import near_returns, orbit_near
 from nldyn.runtime.executors import check_execution, values_of
+from nldyn.runtime.progress import of_number, shows_progress
 
 NEWTON_STEPS = 12
 STEP_HALVINGS = 10
@@ -27,6 +28,7 @@ MARGIN = 1.0  # how far beyond the plane a manifold is followed, in units of its
 SOLVED, LONGEST_STEP = 1e-10, 0.2  # Newton's steps, in units of the plane
 
 
+@shows_progress(of_number("pieces"))
 def stable_manifold(
     orbit: Orbit,
     plane: StatePlane,
@@ -256,6 +258,7 @@ def _distance(a: Real, b: Real) -> float:
     return float(np.linalg.norm(a - b))
 
 
+@shows_progress(of_number("points"))
 def basin_edge(
     found: Basins,
     count: int = 200,

@@ -23,6 +23,7 @@ from nldyn.longterm.simulation import MOST_RECORDED, WHOLE, Motion, motion_of
 from nldyn.orbits.harmonics import modal_row
 from nldyn.orbits.orbit import Orbit
 from nldyn.runtime.executors import check_execution, values_of
+from nldyn.runtime.progress import of_number, shows_progress
 from nldyn.system.system import System
 
 MOST_SAMPLES = 10**6  # in a period
@@ -154,6 +155,7 @@ def contact_measures(
     )
 
 
+@shows_progress(of_number("motions"))
 def measures_table(
     sources: Source | Iterable[Source],
     *,
@@ -215,6 +217,7 @@ def _sources(given: Source | Iterable[Source]) -> list[Orbit | Motion | Attracto
     return [s for s in chosen if not (isinstance(s, Attractor) and s.kind == "failed")]
 
 
+@shows_progress(of_number("motions"))
 def spectra_table(
     sources: Source | Iterable[Source],
     point: str | Real | None = None,
@@ -324,6 +327,7 @@ class SpectraMap:
     rest: Real
 
 
+@shows_progress(of_number("motions"))
 def spectra_map(
     sources: Source | Iterable[Source],
     point: str | Real | None = None,

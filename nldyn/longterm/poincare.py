@@ -22,6 +22,7 @@ from nldyn.orbits.newton import check_bounded
 from nldyn.orbits.orbit import check_observe
 from nldyn.orbits.starts import random_states
 from nldyn.runtime.executors import check_execution, values_of
+from nldyn.runtime.progress import of_number, shows_progress
 from nldyn.system.system import System
 
 Direction = Literal["up", "down", "random"]
@@ -150,6 +151,7 @@ class BruteForce:
         return len(with_kind), len({c.frequency_hz for c in inside})
 
 
+@shows_progress(of_number("motions"))
 def brute_force(
     system: System | FlowMap,
     range_hz: tuple[float, float],

@@ -27,6 +27,7 @@ from nldyn.orbits.history import History
 from nldyn.orbits.newton import check_bounded
 from nldyn.orbits.orbit import Orbit, check_observe, history_of
 from nldyn.runtime.executors import check_execution, values_of
+from nldyn.runtime.progress import of_number, shows_progress
 from nldyn.system.system import System
 
 BLOCK = 64  # periods recorded in one call
@@ -321,6 +322,7 @@ def simulate(
 ) -> list[Motion]: ...
 
 
+@shows_progress(of_number("motions"))
 def simulate(
     system: System | FlowMap,
     frequency_hz: float | Sequence[float] | Real,
@@ -524,6 +526,7 @@ def sweep(
 ) -> list[Motion]: ...
 
 
+@shows_progress(of_number("motions"))
 def sweep(
     system: System | FlowMap,
     range_hz: tuple[float, float] | Sequence[tuple[float, float]],

@@ -625,16 +625,16 @@ def _depth_and_speed(system: System, stop: AnyStop, states: Real) -> tuple[Real,
     return states[:, : system.size] @ v - stop.gap, states[:, system.size :] @ v
 
 
-def check_observe(system: System, observe: str | None) -> str:
+def check_observe(system: System, observe: str | None, called: str = "observe") -> str:
     """Interface to observe: the given one, else the system's first."""
-    check_types(system=(system, System), observe=(observe, str, None))
+    check_types(**{"system": (system, System), called: (observe, str, None)})
     if not system.interfaces:
         raise SystemModelError("the system has no interface to observe")
     if observe is None:
         return system.interfaces[0]
     if observe not in system.interfaces:
         raise SystemModelError(
-            f"observe: unknown interface '{observe}'; there are: {', '.join(system.interfaces)}"
+            f"{called}: unknown interface '{observe}'; there are: {', '.join(system.interfaces)}"
         )
     return observe
 

@@ -24,7 +24,7 @@ from nldyn.orbits.orbit import Orbit, check_observe
 from nldyn.orbits.shooting import ShootingProblem, shooting_problem
 from nldyn.orbits.starts import near_returns
 from nldyn.orbits.time_limit import OutOfTimeError, TimeLimit
-from nldyn.runtime.progress import Progress
+from nldyn.runtime.progress import Progress, shows_progress
 from nldyn.system.equilibrium import at_rest, held_motion, rest
 from nldyn.system.system import System
 
@@ -34,6 +34,7 @@ PERIODS = 200  # of the simulation from rest
 BUNCH = 4  # pieces simulated between two looks at the clock
 
 
+@shows_progress()
 def solve_orbit(
     system: System | FlowMap,
     frequency_hz: float,

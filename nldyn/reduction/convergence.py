@@ -34,7 +34,7 @@ from nldyn.reduction.studied import (
     receptance_bound,
 )
 from nldyn.runtime.executors import as_finished, own_processes
-from nldyn.runtime.progress import Progress, Shares, silent
+from nldyn.runtime.progress import Progress, Shares, shows_progress, silent
 from nldyn.runtime.threads import one_thread
 
 Component = cms.ComponentLike | JoinedComponents
@@ -319,6 +319,7 @@ class ConvergenceStudy:
         return found
 
 
+@shows_progress()
 def convergence_study(
     components: Mapping[str, Component] | Component,
     setting: LoadCase,

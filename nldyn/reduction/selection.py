@@ -23,7 +23,7 @@ from nldyn.reduction.model_errors import (
     special_points_of,
     told,
 )
-from nldyn.runtime.progress import Progress, Shares, silent
+from nldyn.runtime.progress import Progress, Shares, shows_progress, silent
 from nldyn.system.system import System
 
 SAMPLES = 9
@@ -134,6 +134,7 @@ class ModeSelection:
         return "\n".join(lines)
 
 
+@shows_progress()
 def select_modes(
     component: cms.ComponentLike,
     setting: LoadCase,

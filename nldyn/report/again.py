@@ -18,16 +18,17 @@ from nldyn.branches.branch import Branch
 from nldyn.io.store import load
 from nldyn.report.offline import Table, unpacked
 from nldyn.report.page import Drawn, write_page
-from nldyn.report.results import FILES, summary, tables_of
+from nldyn.report.results import FILES, software_name, summary, tables_of
 from nldyn.report.stop_spheres import stops_to_draw
 from nldyn.runtime.progress import Progress, silent
-from nldyn.runtime.result_directory import OutputError, result_directory
+from nldyn.runtime.result_directory import SCENE, OutputError, result_directory
 from nldyn.runtime.unfinished import unfinished_path
-from nldyn.scene.build import AnyComponent, Structure, build_structure
+from nldyn.scene.build import AnyComponent, Structure, build_structure, build_system
 from nldyn.scene.read import load_scene
 from nldyn.scene.schema import Scene
 from nldyn.search.diagram import Diagram
 from nldyn.search.exploration import Exploration
+from nldyn.system.system import same_system
 
 TEXTS = {"branch", "type", "normal_form", "meaning", "end", "reason"}
 UNFINISHED = "The run has not ended: this is what it had computed."
@@ -115,6 +116,27 @@ def report_again(
         page = new / "report.html"
         write_page(diagram, page, tables, told, scene=scene, surface=surface, notes=notes)
     return notes
+
+
+def computed_before(
+    directory: Path, scene: Scene, structure: Structure
+) -> Diagram | Exploration | None:
+    """What a directory holds of this very scene, finished; None if it is to be computed.
+
+    The scene counts word for word, and what its files made of it: the system is compared.
+    """
+    try:
+        text = (directory / SCENE).read_text(encoding="utf-8")
+        if text != scene.text or read_summary(directory)["software"] != software_name():
+            return None
+        system = build_system(scene, structure.reduced)
+        found = load(directory / "branches.h5")
+        kept = as_diagram(found)
+    except (OSError, KeyError, OutputError, SystemModelError):
+        return None
+    if not kept.branches or not same_system(kept.branches[0].points[0].system, system):
+        return None
+    return found if isinstance(found, Exploration) else kept
 
 
 def kept_surface(page: Path, diagram: Diagram) -> Mapping[str, Any] | None:

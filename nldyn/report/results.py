@@ -222,7 +222,7 @@ def summary(diagram: Diagram) -> Mapping[str, object]:
     """Say what was computed and how exactly, as plain numbers for ``summary.json``."""
     orbits = [orbit for branch in diagram.branches for orbit in branch.points]
     return {
-        "software": f"nldyn {software_version()}",
+        "software": software_name(),
         "points": len(orbits),
         "largest_relative_error": worst(orbit.error for orbit in orbits),
         "largest_liouville_error": worst(orbit.liouville_error for orbit in orbits),
@@ -231,6 +231,11 @@ def summary(diagram: Diagram) -> Mapping[str, object]:
         "branches": [_branch_summary(branch, diagram.range_hz) for branch in diagram.branches],
         "cascades": [_cascade_summary(cascade) for cascade in cascades_in(diagram.branches)],
     }
+
+
+def software_name() -> str:
+    """What computed the results, with its version."""
+    return f"nldyn {software_version()}"
 
 
 def _cascade_summary(cascade: Cascade) -> dict[str, object]:

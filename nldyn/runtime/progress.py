@@ -9,18 +9,30 @@ from __future__ import annotations
 
 import logging
 import math
+import multiprocessing
 import shutil
 import sys
+import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
+from functools import wraps
+from importlib.util import find_spec
+from typing import Any, ParamSpec, TypeVar
+
+from tqdm import tqdm
 
 from nldyn.runtime.compilation import compilations
 
 Progress = Callable[[str, float, float], None]
+P = ParamSpec("P")
+R = TypeVar("R")
 
 PAUSE = 0.1  # s, between two lines
+PATIENCE = 2.0  # s, before a line appears that nobody asked for
 SURE = 0.1  # share of the work after which the time that is left is told
+
+_shown = 0  # lines of this process
 
 
 def silent(what: str, frequency_hz: float, done: float) -> None:
@@ -86,15 +98,18 @@ class Shares:
 
 
 class ProgressLine:
-    """The line that a terminal shows while a computation lasts; nothing else is written.
+    """The line that a terminal or a notebook shows while a computation lasts.
 
     It tells how much is done, how long the rest will take, and what is being computed. The time
-    left is told once a tenth is done; time spent compiling does not count.
+    left is told once a tenth is done, from the pace of the last half of the time, so that it grows
+    where the work stands still; time spent compiling does not count.
 
     Parameters
     ----------
     quiet : bool
-        Show nothing. Where the standard error output is no terminal nothing is shown anyway.
+        Show nothing. Where the standard error output is neither nothing is shown anyway.
+    delay : float
+        Time in s before it appears.
 
     Examples
     --------
@@ -104,44 +119,50 @@ class ProgressLine:
     0.5
     """
 
-    def __init__(self, quiet: bool = False) -> None:
-        self.shown = sys.stderr.isatty() and not quiet
+    def __init__(self, quiet: bool = False, delay: float = 0.0) -> None:
         self.done = 0.0
-        self._start = self._last = time.monotonic()
-        self._last -= PAUSE
-        self._first: float | None = None
+        self._start = time.monotonic()
         self._compiled = compilations.seconds()
+        self._course: list[tuple[float, float]] = []  # time spent in s, and the share done by then
+        hidden = quiet or not (sys.stderr.isatty() or in_notebook())
+        self._bar = None if hidden else _bar(delay)
 
     def __repr__(self) -> str:
-        return f"<ProgressLine: {self.text('...', 0.0)}>"
+        return f"<ProgressLine: {self.done:.0%} done>"
 
     def __call__(self, what: str, frequency_hz: float, done: float) -> None:
-        """Take the news of a computation, and show them if it is time."""
-        if self._first is None:
-            self._first = min(max(done, 0.0), 1.0)  # what an interrupted run had done
-        self.done = max(self.done, min(done, 1.0))
-        now = time.monotonic()
-        if self.shown and now - self._last >= PAUSE:
-            self._last = now
-            self._write(self.text(what, frequency_hz))
+        """Take the news of a computation, and show them if it is time; NaN for an unknown share."""
+        share = 0.0 if math.isnan(done) else min(max(done, 0.0), 1.0)
+        self.done = max(self.done, share)
+        if not self._course or self.done > self._course[-1][1]:
+            self._course.append((self._spent(), self.done))
+        if self._bar is not None:
+            self._bar.set_description_str(self.text(what, frequency_hz), refresh=False)
+            self._bar.update(self.done - self._bar.n)
+
+    def _spent(self) -> float:
+        compiling = compilations.seconds() - self._compiled
+        return time.monotonic() - self._start - compiling
 
     def left(self) -> float:
         """Time in s that the rest will take; NaN while that cannot be told."""
-        first = self._first or 0.0
-        own = self.done - first
-        if own < SURE * (1.0 - first) or own <= 0.0:
+        if not self._course:
             return math.nan
-        compiling = compilations.seconds() - self._compiled
-        spent = time.monotonic() - self._start - compiling
-        return spent * (1.0 - self.done) / own
+        begin, first = self._course[0]  # what an interrupted run had done
+        now = self._spent()
+        middle = 0.5 * (begin + now)
+        since, before = [place for place in self._course if place[0] <= middle][-1]
+        recent = self.done - before
+        if self.done - first < SURE * (1.0 - first) or recent <= 0.0:
+            return math.nan
+        return (now - since) * (1.0 - self.done) / recent
 
     def text(self, what: str, frequency_hz: float) -> str:
-        """The line: how much is done, how long the rest will take, and what is computed."""
-        minutes, seconds = divmod(int(time.monotonic() - self._start), 60)
+        """How long the rest will take, and what is computed."""
         left = self.left()
-        rest = "" if math.isnan(left) else f", about {duration(left)} left"
+        rest = "" if math.isnan(left) else f"about {duration(left)} left: "
         where = f" at {frequency_hz:.2f} Hz" if frequency_hz else ""
-        return f"{minutes:02d}:{seconds:02d}  {self.done:.0%} done{rest}: {what}{where}"
+        return f"{rest}{what}{where}"
 
     def counted(self, what: str) -> Callable[[int, int], None]:
         """The function that many equal computations call as ``(done, total)``."""
@@ -149,12 +170,29 @@ class ProgressLine:
 
     def clear(self) -> None:
         """Remove the line."""
-        if self.shown:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+        if self._bar is not None:
+            self._bar.close()
 
-    def _write(self, line: str) -> None:
-        width = shutil.get_terminal_size().columns - 1
-        print(f"\r\x1b[K{line[:width]}", end="", file=sys.stderr, flush=True)
+
+def _bar(delay: float) -> Any:
+    """A bar on stderr, by widgets where a notebook has them."""
+    kind: Any = tqdm
+    width: int | None = shutil.get_terminal_size().columns - 1
+    if in_notebook() and find_spec("ipywidgets") is not None:
+        from tqdm.notebook import tqdm_notebook
+
+        kind, width = tqdm_notebook, None
+    return kind(
+        total=1.0, leave=False, delay=delay, mininterval=PAUSE, miniters=0, file=sys.stderr,
+        ncols=width, bar_format="{elapsed} {percentage:3.0f} % done |{bar:16}| {desc}",
+    )  # fmt: skip
+
+
+def in_notebook() -> bool:
+    """Whether a kernel of Jupyter runs this."""
+    shell = sys.modules.get("IPython")
+    running = shell.get_ipython() if shell is not None else None
+    return running is not None and "IPKernelApp" in running.config
 
 
 def duration(seconds: float) -> str:
@@ -210,9 +248,83 @@ def progress_line(quiet: bool = False) -> Iterator[ProgressLine]:
     >>> with progress_line(quiet=True) as report:
     ...     report("1/2", 45.0, 0.1)
     """
+    global _shown
     report = ProgressLine(quiet)
+    _shown += 1
     try:
         with compilations.silenced(quiet), nullcontext() if quiet else messages_shown():
             yield report
     finally:
+        _shown -= 1
         report.clear()
+
+
+def shows_progress(
+    adapted: Callable[[ProgressLine], Callable[..., None]] = lambda line: line,
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Let a function with a ``progress`` show a line of its own where it is given none.
+
+    The line appears after two seconds, in a terminal or a notebook; within another one, in
+    a thread and in a worker process there is none.
+
+    Parameters
+    ----------
+    adapted : callable
+        Makes of the line what the function takes as ``progress``.
+
+    Examples
+    --------
+    >>> @shows_progress()
+    ... def work(progress=None):
+    ...     progress("half", 0.0, 0.5)
+    >>> work()
+    >>> work(progress=print)
+    half 0.0 0.5
+    """
+
+    def showing(function: Callable[P, R]) -> Callable[P, R]:
+        @wraps(function)
+        def call(*args: P.args, **kwargs: P.kwargs) -> R:
+            global _shown
+            if kwargs.get("progress") is not None or _shown or not _at_the_front():
+                return function(*args, **kwargs)
+            line = ProgressLine(delay=PATIENCE)
+            _shown += 1
+            try:
+                kwargs["progress"] = adapted(line)
+                return function(*args, **kwargs)
+            finally:
+                _shown -= 1
+                line.clear()
+
+        return call
+
+    return showing
+
+
+def _at_the_front() -> bool:
+    """Whether this is the thread and the process that a user looks at."""
+    main = threading.current_thread() is threading.main_thread()
+    return main and multiprocessing.parent_process() is None
+
+
+def of_number(what: str) -> Callable[[ProgressLine], Callable[[int, int], None]]:
+    """For `shows_progress`: what tells how many of so many are done."""
+    return lambda line: line.counted(what)
+
+
+def of_frequency(what: str) -> Callable[[ProgressLine], Callable[[float], None]]:
+    """For `shows_progress`: what tells the frequency in Hz that it is at."""
+    return lambda line: lambda hz: line(what, hz, math.nan)
+
+
+def of_place(what: str) -> Callable[[ProgressLine], Callable[..., None]]:
+    """For `shows_progress`: what tells the values of the parameters that it is at."""
+
+    def adapted(line: ProgressLine) -> Callable[..., None]:
+        def tell(place: Iterable[float]) -> None:
+            line(f"{what} at " + ", ".join(f"{value:.6g}" for value in place), 0.0, math.nan)
+
+        return tell
+
+    return adapted

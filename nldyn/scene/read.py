@@ -15,6 +15,7 @@ from nldyn.scene.checks import check_scene
 from nldyn.scene.faults import check_regular, lower_first, unreadable
 from nldyn.scene.messages import from_validation, scene_error
 from nldyn.scene.schema import Scene
+from nldyn.scene.toml_faults import likely_missing
 
 LARGEST_SCENE = 10_000_000  # bytes or letters
 _WORD = r"""(?:(?<![\w-])[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
@@ -98,7 +99,8 @@ def parse_scene(
     try:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        fault = f"is not valid TOML: {_toml_fault(str(error))}"
+        likely = likely_missing(text, str(error))
+        fault = f"is not valid TOML: {_toml_fault(str(error))}" + (f"; {likely}" if likely else "")
         raise scene_error(file, (), fault) from None
     return scene_from_tables(tables, file, text, mesh_folders)
 

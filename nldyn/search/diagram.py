@@ -37,7 +37,7 @@ from nldyn.orbits.starts import (
     reach,
     simulate_strobe,
 )
-from nldyn.runtime.progress import Progress, silent
+from nldyn.runtime.progress import Progress, shows_progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.collector import Collector, counted
 from nldyn.search.outlook import Outlook
@@ -188,6 +188,7 @@ def check_known(known: Diagram, flow: FlowMap) -> None:
 
 
 @one_thread()
+@shows_progress()
 def diagram(
     system: System | FlowMap,
     range_hz: tuple[float, float],

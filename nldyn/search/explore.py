@@ -35,7 +35,7 @@ from nldyn.orbits.starts import (
     random_states,
     settling_periods,
 )
-from nldyn.runtime.progress import Progress, silent
+from nldyn.runtime.progress import Progress, shows_progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.collector import Collector
 from nldyn.search.diagram import MOST_JOBS, Diagram, check_known
@@ -79,6 +79,7 @@ class ExplorationFile(Protocol):
 
 
 @one_thread()
+@shows_progress()
 def explore(
     system: System | FlowMap,
     range_hz: tuple[float, float],

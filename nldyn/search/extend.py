@@ -20,7 +20,7 @@ from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import MOST_COUNT
-from nldyn.runtime.progress import Progress, silent
+from nldyn.runtime.progress import Progress, shows_progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.collector import Collector, counted, middle_orbit
 from nldyn.search.diagram import Diagram, check_known
@@ -97,6 +97,7 @@ class Strategy(Protocol):
 
 
 @one_thread()
+@shows_progress()
 def extend_diagram(
     known: Diagram,
     strategy: Strategy,

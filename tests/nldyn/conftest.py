@@ -1,12 +1,14 @@
 """The 1-DOF system of equation 3.1, and branches of it."""
 
+import inspect
+
 import pytest
 from problems import RANGE_HZ, THREE_HZ, make_one_dof
 
 from nldyn import Diagram, System, continue_branch, solve_orbit
 
 # whether an orbit is found is not to depend on how fast a machine is
-solve_orbit.__kwdefaults__["seconds"] = 1e6
+inspect.unwrap(solve_orbit).__kwdefaults__["seconds"] = 1e6
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,8 @@ import sys
 from dataclasses import replace
 
 import pytest
+import scipy.io
+import scipy.sparse
 from click.testing import CliRunner
 from fakes import diagram
 
@@ -325,6 +327,34 @@ def test_check_names_what_takes_long(tmp_path):
         said = [line for line in invoke("check", scene).stdout.splitlines() if "note:" in line]
         assert len(said) == len(notes)
         assert all(note in line for note, line in zip(notes, said, strict=True))
+
+
+def test_a_finished_scene_is_not_computed_again_unless_asked(tmp_path):
+    """What its files hold by now counts: its text alone does not tell."""
+    scene = tmp_path / "scene.toml"
+    one = '[matrices]\nmass = "m.mtx"\nstiffness = "k.mtx"\ninterfaces.tip = [1.0]\n[damping]'
+    ranged = FREE[FREE.index("modal_ratio") :].replace("[10.0, 30.0]", "[0.9, 1.1]\nperiods = [1]")
+    scene.write_text(f"{one}\n{ranged}")
+    for name, value in (("m", 1.0), ("k", 40.0)):
+        scipy.io.mmwrite(tmp_path / f"{name}.mtx", scipy.sparse.coo_array([[value]]))
+    run = ("run", scene, "--out", tmp_path / "out", "--quiet", "--jobs", "1")
+    first = invoke(*run)
+    assert first.exit_code == 0 and "computed before" not in first.stdout
+    page = tmp_path / "out" / "report.html"
+    written = page.stat().st_mtime_ns
+    assert "all of it was computed before" in invoke(*run).stdout
+    assert page.stat().st_mtime_ns == written
+    assert "computed before" not in invoke(*run, "--replace").stdout
+    assert page.stat().st_mtime_ns != written
+    scipy.io.mmwrite(tmp_path / "k.mtx", scipy.sparse.coo_array([[41.0]]))
+    assert "computed before" not in invoke(*run).stdout
+
+
+def test_summaries_of_commands_are_not_cut():
+    said = invoke("--help").stdout
+    assert "..." not in said.partition("Commands:")[2]
+    words = " ".join(said.split())
+    assert "basins Find which initial states of a scene lead to which attractor, in a" in words
 
 
 def test_check_tells_the_residual_mode_from_the_others():

@@ -1,8 +1,10 @@
 """The command from its first moment: Ctrl-C while loading, the kernels' folder, progress."""
 
 import io
+import math
 import multiprocessing
 import os
+import re
 import subprocess
 import sys
 import time
@@ -10,6 +12,7 @@ import types
 
 import numba
 import pytest
+import tqdm.std
 
 from nldyn.app import command
 from nldyn.paper.workers import ended_at_failure
@@ -84,16 +87,19 @@ def clock(monkeypatch):
     """Time that goes on as told."""
     now = [0.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(tqdm.std, "time", lambda: now[0])
     return now
 
 
 def shown_lines(terminal):
-    return [line for line in terminal.getvalue().split("\r\x1b[K") if line]
+    """What follows the clock and the bar."""
+    lines = [line.rstrip() for line in terminal.getvalue().split("\r")]
+    return [re.sub(r"\|.*\| ?", "| ", line) for line in lines if line]
 
 
 def test_terminal_gets_one_line_that_is_cleared_at_the_end(monkeypatch, clock):
     monkeypatch.setattr(sys, "stderr", Terminal())
-    monkeypatch.setenv("COLUMNS", "60")
+    monkeypatch.setenv("COLUMNS", "80")
     with progress.progress_line() as report:
         for seconds, done in ((0.0, 0.0), (30.0, 0.05), (60.0, 0.25), (60.01, 0.3), (90.0, 0.5)):
             clock[0] = seconds
@@ -101,13 +107,51 @@ def test_terminal_gets_one_line_that_is_cleared_at_the_end(monkeypatch, clock):
         clock[0] = 100.0
         report("x" * 100, 0.0, 0.5)
     shown = shown_lines(sys.stderr)
-    assert shown[:4] == [
-        "00:00  0% done: 1/2 at 45.68 Hz",
-        "00:30  5% done: 1/2 at 45.68 Hz",  # less than a tenth tells too little
-        "01:00  25% done, about 3 min left: 1/2 at 45.68 Hz",
-        "01:30  50% done, about 2 min left: 1/2 at 45.68 Hz",  # that of 0.01 s is left out
+    assert shown[1:4] == [
+        "00:30   5 % done | 1/2 at 45.68 Hz",  # less than a tenth tells too little
+        "01:00  25 % done | about 2 min left: 1/2 at 45.68 Hz",  # 20 % in the last 30 s
+        "01:30  50 % done | about 1 min left: 1/2 at 45.68 Hz",  # that of 0.01 s is left out
     ]
-    assert len(shown) == 5 and len(shown[4]) == 59 and sys.stderr.getvalue().endswith("\r\x1b[K")
+    widest = max(len(line) for line in sys.stderr.getvalue().split("\r"))
+    assert len(shown) == 5 and widest <= 80 and sys.stderr.getvalue().endswith("\r")
+
+
+def test_the_time_left_grows_where_the_work_stands_still(clock):
+    """82 % in a minute, then nothing: after as long again nobody can tell."""
+    line = progress.ProgressLine()
+    for clock[0], done in ((0.0, 0.0), (30.0, 0.41), (60.0, 0.82)):
+        line("1/1", 20.0, done)
+    told = []
+    for clock[0] in (60.0, 90.0, 118.0, 130.0):
+        line("1/1", 20.0, 0.82)
+        told.append(line.left())
+    standing = [0.18 / 0.41 * seconds for seconds in (30.0, 60.0, 88.0)]
+    assert told[:3] == pytest.approx(standing) and math.isnan(told[3])
+
+
+def test_a_long_call_of_the_library_shows_a_line_of_its_own_and_only_one(monkeypatch, clock):
+    """It appears after two seconds; what it calls shows none, nor what is told elsewhere."""
+
+    @progress.shows_progress()
+    def inner(progress=None):
+        progress and progress("inner", 0.0, 0.9)
+
+    @progress.shows_progress()
+    def outer(seconds, progress=None):
+        clock[0] += seconds
+        inner()
+        progress("outer", 0.0, 0.5)
+
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    outer(1.0)
+    assert not shown_lines(sys.stderr)
+    told = []
+    outer(3.0, progress=lambda *news: told.append(news))
+    assert told == [("outer", 0.0, 0.5)] and not shown_lines(sys.stderr)
+    outer(3.0)
+    assert shown_lines(sys.stderr) == ["00:03  50 % done | outer"]
+    inner()
+    assert len(shown_lines(sys.stderr)) == 1
 
 
 @pytest.mark.parametrize("quiet", [True, False])

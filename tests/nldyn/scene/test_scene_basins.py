@@ -124,7 +124,7 @@ def test_states_behind_a_rigid_stop_do_not_count(tmp_path):
     ("text", "more", "fault"),
     [
         (LINEAR, ("--x", "place:x"), "'place:x' is neither displacement:INTERFACE nor velocity"),
-        (LINEAR, ("--x", "displacement:y"), "unknown interface 'y'; there are: x"),
+        (LINEAR, ("--x", "displacement:y"), "value for '--x': 'y' is not an interface; known"),
         (LINEAR, ("--x", "velocity:x"), "the velocity of 'x' moves with that of 'x'"),
         (LINEAR, ("--x-range", "1", "-1"), "x_range must be two ascending numbers"),
         (LINEAR.replace("0.2", "0.0"), (), "a system without damping has no attractors"),

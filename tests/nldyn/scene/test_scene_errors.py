@@ -77,7 +77,8 @@ def test_not_text(tmp_path):
 
 def test_not_toml_names_the_line(tmp_path):
     said = check(tmp_path, "[modal]\nfrequencies_hz = \n")
-    assert said == "scene.toml: is not valid TOML: invalid value (at line 2, column 18)"
+    fault = "scene.toml: is not valid TOML: invalid value (at line 2, column 18)"
+    assert said == f"{fault}; in 'frequencies_hz =' the value is missing"
 
 
 @pytest.mark.parametrize(
