@@ -36,7 +36,7 @@ from fem.model.parts import TrussPart
 from fem.model.store import load_model, save_model
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Component(InertiaLoads):
     """An assembled frame: N free degrees of freedom, two matrices and named interfaces.
 

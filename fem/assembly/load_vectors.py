@@ -10,14 +10,25 @@ import numpy as np
 
 from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError
+from fem.elements.scatter import SparseArray
 
 
 class InertiaLoads:
     """What the dataclass of a component needs to be loaded by its own mass."""
 
+    mass: SparseArray
     interfaces: Mapping[str, FloatArray]
     inertia: FloatArray
+    rigid_mass: FloatArray
     load_vectors: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        """One line: how large and how heavy it is, and where it can be held or hit."""
+        rows, names = self.mass.shape[0], ", ".join(f"'{name}'" for name in self.interfaces)
+        return (
+            f"<{type(self).__name__} of {rows} degrees of freedom, {self.rigid_mass[0, 0]:.4g} kg; "
+            f"interfaces {names or 'none'}>"
+        )
 
     def with_load(self, name: str, acceleration: Sequence[float]) -> Self:
         """The component with a load vector: its weight under an acceleration.

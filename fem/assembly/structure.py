@@ -74,7 +74,7 @@ class DistortionWarning(UserWarning):
     """Cells that are out of shape: their part may be too stiff, and its stresses wrong there."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class StructureComponent(InertiaLoads):
     """An assembled structure: N free degrees of freedom, two matrices and named interfaces.
 

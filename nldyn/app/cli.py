@@ -165,7 +165,7 @@ def run(
         loaded = load_scene(scene, mesh_folders)
         check_results(out, loaded, replace)
         from nldyn.io.checkpoint import CheckpointFile
-        from nldyn.report.again import computed_before, drawn_of
+        from nldyn.report.again import computed_before, drawn_of, read_summary
         from nldyn.report.results import write_results
         from nldyn.scene.run import compute, explore_scene, parts_of_work, structure_of
         from nldyn.search.exploration import Exploration
@@ -187,9 +187,8 @@ def run(
         seconds = time.perf_counter() - start
         coverage = found.coverage_lines() if isinstance(found, Exploration) else []
         diagram = found.diagram if isinstance(found, Exploration) else found
+        told = read_summary(out)
         if as_json:
-            from nldyn.report.results import summary
-
             print_json(
                 {
                     "scene": str(scene),
@@ -198,11 +197,12 @@ def run(
                     "seconds": seconds,
                     "special_points": special_counts(diagram),
                     "coverage": coverage,
-                    **summary(diagram),
+                    **told,
                 }
             )
         else:
-            click.echo("\n".join([*coverage, describe(diagram, seconds, out)]))
+            lines = [*told.get("answer", []), *coverage, describe(diagram, seconds, out)]
+            click.echo("\n".join(lines))
             if before is not None:
                 click.echo("all of it was computed before; '--replace' computes it anew")
         if not diagram.branches:

@@ -89,12 +89,16 @@ class Impacts:
         return int(self.time.size)
 
     def __repr__(self) -> str:
-        """One line: how many, and the largest speed and force."""
+        """One line: how many, the largest speed, and the largest force, or impulse where rigid."""
         if not len(self):
             return "<Impacts: none>"
+        largest = self.peak_force.max()
+        hardest = (
+            f"{largest:.4g} N" if np.isfinite(largest) else f"{self.impulse.max():.4g} N s"
+        )
         return (
             f"<Impacts: {len(self)} from {self.time[0]:.4g} to {self.time[-1]:.4g} s, "
-            f"at most {self.speed.max():.4g} m/s and {self.peak_force.max():.4g} N>"
+            f"at most {self.speed.max():.4g} m/s and {hardest}>"
         )
 
     def columns(self) -> dict[str, NDArray[Any]]:

@@ -414,7 +414,9 @@ def peak_force(orbit: Orbit) -> float:
     """
     stops = orbit.system.elastic_stops
     if len(stops) < len(orbit.system.stops) or any(stop.depends_on_speed for stop in stops):
-        return max((impact.force for impact in orbit.impact_list), default=0.0)
+        return max(
+            (math.inf if hit.force is None else hit.force for hit in orbit.impact_list), default=0.0
+        )
     return max((float(stops[i].force(depth)) for i, depth in _depths(orbit)), default=0.0)
 
 

@@ -84,14 +84,26 @@ class Impact:
         Instant of deepest penetration in s from forcing phase zero.
     penetration : float
         Deepest penetration in m.
-    force : float
-        Largest contact force in N; infinite at a rigid stop, see `nldyn.impacts` for the impulse.
+    force : float or None
+        Largest contact force in N; None at a rigid stop, whose force lasts no time.
+    speed, impulse : float or None
+        At a rigid stop the speed in m/s at which it is hit, and the impulse in N s; else None, see
+        `nldyn.impacts`.
     """
 
     stop: int
     time: float
     penetration: float
-    force: float
+    force: float | None
+    speed: float | None = None
+    impulse: float | None = None
+
+    def __repr__(self) -> str:
+        """One line: where, when and how hard."""
+        told = f"<Impact on stop {self.stop} at {self.time:.6g} s, "
+        if self.force is None:
+            return f"{told}{self.speed:.4g} m/s and {self.impulse:.4g} N s>"
+        return f"{told}{self.penetration:.4g} m deep and {self.force:.4g} N>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -452,27 +464,41 @@ class Orbit:
 
     @cached_property
     def impact_list(self) -> tuple[Impact, ...]:
-        """Contact peaks in the order of time (a double-peaked contact counts twice here)."""
-        impacts = [
-            Impact(
-                index,
-                float(phase / self.omega),
-                0.0 if isinstance(stop, RigidStop) else float(depth),
-                self._largest_force(index, float(phase), float(depth)),
-            )
-            for index, (stop, peaks) in enumerate(
-                zip(self.system.stops, self.penetration_peaks, strict=True)
-            )
-            for phase, depth in zip(peaks.phases, peaks.values, strict=True)
+        """Contact peaks in the order of time (a double-peaked contact counts twice here).
+
+        Of impacts with a rigid stop that end in rest the first counts.
+        """
+        found = []
+        for index, stop in enumerate(self.system.stops):
+            of_stop = self._rigid_list if isinstance(stop, RigidStop) else self._elastic_list
+            found += of_stop(index)
+        return tuple(sorted(found, key=lambda impact: impact.time))
+
+    def _elastic_list(self, index: int) -> list[Impact]:
+        """Contact peaks at a stop that gives way."""
+        peaks = self.penetration_peaks[index]
+        pairs = zip(peaks.phases.tolist(), peaks.values.tolist(), strict=True)
+        return [
+            Impact(index, phase / self.omega, depth, self._largest_force(index, phase, depth))
+            for phase, depth in pairs
             if depth > 0.0
         ]
-        return tuple(sorted(impacts, key=lambda impact: impact.time))
+
+    def _rigid_list(self, index: int) -> list[Impact]:
+        """Impacts with a rigid stop."""
+        hits = rigid_impacts(self.trajectory, index)
+        c = self.system.stop_vector(self.system.stops[index])
+        keep = ~series_to_rest(self.trajectory, index, hits).follows
+        columns = (hits.phase / self.omega, hits.speed, hits.impulse(float(c @ c)))
+        return [
+            Impact(index, time, 0.0, None, speed, impulse)
+            for time, speed, impulse in zip(*(each[keep].tolist() for each in columns), strict=True)
+        ]
 
     def _largest_force(self, index: int, phase: float, depth: float) -> float:
         """Largest force of the contact whose penetration is deepest at a phase."""
         stop = self.system.stops[index]
-        if isinstance(stop, RigidStop):
-            return math.inf
+        assert not isinstance(stop, RigidStop)
         if not stop.depends_on_speed:
             return float(stop.force(depth))
 

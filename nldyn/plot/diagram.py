@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from nldyn.base.errors import check_choice, check_types
 from nldyn.branches.branch import check_branches
 from nldyn.plot.hover import show_labels
+from nldyn.runtime.progress import in_notebook
 from nldyn.system.naming import stop_name
 from nldyn.system.rigid_stop import AnyStop
 
@@ -209,7 +212,7 @@ def plot_diagram(
     diagram : Diagram, Branch or iterable of Branch
         Branches to draw.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure, free of pyplot, unless given.
+        Where to draw; a new figure unless given, which pyplot shows where it is in use.
     yscale : {"linear", "log"}
         Scale of the displacement axis.
     special_points : sequence of str
@@ -337,7 +340,7 @@ def save_diagram(
     yscale: Literal["linear", "log"] = "linear",
 ) -> None:
     """Write ``diagram.png`` and ``diagram.svg`` to a directory that exists."""
-    ax = plot_diagram(diagram, yscale=yscale)
+    ax = plot_diagram(diagram, file_axes(), yscale=yscale)
     ax.set_title(title, parse_math=False)
     save_figure(ax, Path(directory) / "diagram")
 
@@ -352,16 +355,35 @@ def save_figure(ax: Axes, stem: Path) -> None:
 
 
 def new_axes(width: float = 10.5, height: float = 5.5) -> Axes:
-    """Make the axes of a figure of its own, in inches, without pyplot."""
+    """Make the axes of a new figure, in inches, see `new_figure`."""
+    return new_figure(width, height).add_subplot()
+
+
+def file_axes(width: float = 10.5, height: float = 5.5) -> Axes:
+    """Make the axes of a figure for a file, in inches, that is shown nowhere."""
+    return _hidden_figure(width, height).add_subplot()
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Make a figure that pyplot shows where it is in use, as in a notebook; else one of its own."""
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    if pyplot is None and in_notebook():
+        pyplot = importlib.import_module("matplotlib.pyplot")
+    if pyplot is None:
+        return _hidden_figure(width, height)
+    figure: Figure = pyplot.figure(figsize=(width, height), layout="constrained")
+    return figure
+
+
+def _hidden_figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
-    return figure.add_subplot()
+    return figure
 
 
 def new_axes_pair(width: float = 9.0, height: float = 6.0) -> tuple[Axes, Axes]:
     """Make two axes one above the other that share the time axis."""
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(width, height)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
     return upper, lower
 

@@ -71,7 +71,7 @@ def plot_section(
     motion : Motion
         What `nldyn.simulate` gave, with a transient left out.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure, free of pyplot, unless given.
+        Where to draw; a new figure unless given, which pyplot shows where it is in use.
     interface : str, optional
         Of the stroboscopic section; the first unless given.
     stop : int, optional
@@ -125,7 +125,7 @@ def plot_brute_force(
     found : BruteForce
         What `nldyn.longterm.brute_force` gave.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure, free of pyplot, unless given.
+        Where to draw; a new figure unless given, which pyplot shows where it is in use.
     quantity : {"peak", "strobe", "impact speed", "impact phase"}
         The largest absolute displacement of each recorded period, the displacement at forcing
         phase zero, or speed or forcing phase of each impact on any stop.
@@ -266,7 +266,7 @@ def plot_sweep(
     motions : Motion or sequence of Motion
         What `nldyn.sweep` gave.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure, free of pyplot, unless given.
+        Where to draw; a new figure unless given, which pyplot shows where it is in use.
     interface : str, optional
         The first unless given.
     diagram : Diagram or iterable of Branch, optional
@@ -335,7 +335,7 @@ def plot_wear(
     table : mapping of str to (k,) array
         What `nldyn.longterm.measures_table` gave.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure, free of pyplot, unless given.
+        Where to draw; a new figure unless given, which pyplot shows where it is in use.
     measures : sequence of str
         Columns of the table, up to five of one unit.
     yscale : {"linear", "log"}
@@ -439,7 +439,7 @@ def plot_spectra(
     found : SpectraMap
         What `nldyn.longterm.spectra_map` gave, of at least one motion.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure, free of pyplot, unless given.
+        Where to draw; a new figure unless given, which pyplot shows where it is in use.
     scale : {"frequency", "order"}
         What goes upwards: the frequency in the spectrum in Hz, or that over the excitation
         frequency.
@@ -535,7 +535,7 @@ def plot_basins(
     found : Basins
         What `nldyn.basins` gave.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure, free of pyplot, unless given.
+        Where to draw; a new figure unless given, which pyplot shows where it is in use.
     manifolds : sequence of (k, 2) arrays
         Curves or points drawn over them, in coordinates of the plane.
     saddles : (k, 2) array, optional

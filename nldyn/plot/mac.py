@@ -28,7 +28,7 @@ def plot_mac(
     mac : (k, l) array
         Modal assurance criterion, from 0 to 1, as `cms.mac` gives it.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure, free of pyplot, unless given.
+        Where to draw; a new figure unless given, which pyplot shows where it is in use.
     frequencies_hz, other_hz : (k,), (l,) array, optional
         Frequencies in Hz to be written beside the modes of the rows and of the columns.
 

@@ -36,7 +36,7 @@ def plot_history(
     orbit : Orbit
         A periodic orbit; an unstable one is drawn dotted.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure, free of pyplot, unless given.
+        Where to draw; a new figure unless given, which pyplot shows where it is in use.
     interface : str, optional
         The observed one unless given.
     samples : int

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -482,7 +483,9 @@ def contact_time(orbit: Orbit) -> float:
 
 def largest_force(orbit: Orbit) -> float:
     """Largest contact force in N over a period."""
-    return max((impact.force for impact in orbit.impact_list), default=0.0)
+    return max(
+        (math.inf if hit.force is None else hit.force for hit in orbit.impact_list), default=0.0
+    )
 
 
 def errors_of(model: Measured, reference: Measured, best: Measured, full: bool) -> Errors:

@@ -16,6 +16,7 @@ from fem.render.several import Several
 from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.branches.branch import Branch
 from nldyn.io.store import load
+from nldyn.report.answer import answer_lines
 from nldyn.report.offline import Table, unpacked
 from nldyn.report.page import Drawn, write_page
 from nldyn.report.results import FILES, software_name, summary, tables_of
@@ -111,6 +112,8 @@ def report_again(
     progress("tables", 0.0, 0.3)
     tables = read_tables(folder) if finished else tables_of(diagram)
     told = read_summary(folder) if finished else summary(diagram)
+    if "answer" not in told:  # written before, or not yet
+        told["answer"] = answer_lines(diagram, tables["special_points"])
     progress("orbits", 0.0, 0.6)
     with result_directory(directory, "report") as new:
         page = new / "report.html"

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from nldyn.branches.backbone import Backbone, farthest_from
 from nldyn.curves.curves import Curve
-from nldyn.plot.diagram import PERIOD_COLOURS, length_unit, new_axes, save_figure
+from nldyn.plot.diagram import PERIOD_COLOURS, file_axes, length_unit, save_figure
 from nldyn.report.results import write_table
 from nldyn.runtime.result_directory import result_directory
 
@@ -65,7 +65,7 @@ def draw_forced(ax: Axes, forced: Curve, found: Backbone) -> None:
 
 def plot_backbone(found: Backbone, title: str = "") -> Axes:
     """Draw the amplitude against the frequency of the free motion; crosses are unstable."""
-    ax = new_axes()
+    ax = file_axes()
     factor, unit = length_unit(float(found.amplitude.max()))
     ax.plot(found.frequency_hz, found.amplitude / factor, ".-", color=PERIOD_COLOURS[0])
     unstable = ~found.stable

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from nldyn.longterm.basins import Basins
 from nldyn.longterm.neighbourhoods import UNDECIDED
-from nldyn.plot.diagram import save_figure
+from nldyn.plot.diagram import file_axes, save_figure
 from nldyn.plot.longterm import plot_basins
 from nldyn.report.results import if_known, write_table
 from nldyn.runtime.result_directory import result_directory
@@ -31,7 +31,7 @@ def write_basins(found: Basins, directory: str | Path, text: str, title: str = "
         write_table(folder / "attractors.csv", COLUMNS, attractor_rows(found))
         columns = (found.plane.x_label, found.plane.y_label, "attractor", "phase", "periods")
         write_table(folder / "basins.csv", columns, cell_rows(found))
-        ax = plot_basins(found)
+        ax = plot_basins(found, file_axes(7.0, 5.5))
         if title:
             ax.set_title(f"{title}\n{ax.get_title()}")
         save_figure(ax, folder / "basins")

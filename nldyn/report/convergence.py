@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from nldyn.plot.diagram import MARKERS, PERIOD_COLOURS, new_axes, save_figure
+from nldyn.plot.diagram import MARKERS, PERIOD_COLOURS, file_axes, save_figure
 from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy
 from nldyn.reduction.model_errors import counted_modes
 from nldyn.report.convergence_page import write_study_page
@@ -96,7 +96,7 @@ def error_panels(
 
 def plot_cost(study: ConvergenceStudy, title: str = "") -> Axes:
     """Draw the errors of the resonance peak and of the folds and flips against time per orbit."""
-    ax = new_axes(8.0, 5.0)
+    ax = file_axes(8.0, 5.0)
     times = [1e3 * model.seconds_per_orbit for model in study.models]
     by_modes = counts_vary(study)
     series = study.series() if by_modes else study.mesh_series()
@@ -153,7 +153,7 @@ def draw_series(
 def plot_special_points(study: ConvergenceStudy, title: str = "") -> Axes:
     """Draw the folds and flips of the harmonic branch of every model, one line for each."""
     followed = [model for model in study.models if model.special_hz]
-    ax = new_axes(10.5, 1.5 + 0.22 * len(followed))
+    ax = file_axes(10.5, 1.5 + 0.22 * len(followed))
     for row, model in enumerate(followed):
         for kind, colour in (("LP", PERIOD_COLOURS[0]), ("PD", PERIOD_COLOURS[1])):
             places = (model.special_hz or {})[kind]

@@ -180,7 +180,7 @@ def _motion(orbit: Orbit, samples: int) -> dict[str, Any]:
         "forces": [floats(force) for force in orbit.history_at(phases, states).force.T],
         "strobe": [value.tolist() for value in start],
         "impacts": [
-            [hit.time, hit.stop, hit.penetration, hit.force if math.isfinite(hit.force) else None]
+            [hit.time, hit.stop, hit.penetration, hit.force, hit.speed, hit.impulse]
             for hit in orbit.impact_list
         ],
     }

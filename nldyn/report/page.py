@@ -131,6 +131,7 @@ def page_content(
     orbits = [orbit_content(each, samples) for each in chosen]
     content: dict[str, Any] = {
         "title": (scene.title if scene else "") or "Bifurcation diagram",
+        "answer": summary.get("answer", []),
         "range_hz": list(diagram.range_hz),
         "observe": diagram.observe,
         "factor": factor,
@@ -143,7 +144,7 @@ def page_content(
         "stops": stops_of(branches[0].points[0]) if branches else {"names": [], "places": []},
         "orbits": orbits,
         "tables": {
-            "special points": as_table(tables["special_points"]),
+            "special points": special_table(tables["special_points"], factor, unit),
             "branches": branch_table(branches, tables),
             "points": as_table(kept_rows(tables["points"], branches, kept)),
         },
@@ -326,6 +327,25 @@ def special_marks(branches: Sequence[ToldBranch], factor: float, unit: str) -> l
         for number, branch in enumerate(branches)
         for index, special in enumerate(branch.special_points)
     ]
+
+
+def special_table(table: Table, factor: float, unit: str) -> dict[str, Any]:
+    """What special points mean, first, and where they are; special_points.csv has every digit.
+
+    Examples
+    --------
+    >>> names = ("meaning", "type", "frequency_hz", "max_abs_displacement_m", "branch")
+    >>> row = ("A fold.", "LP", 20.123456789, 1.23456789e-4, "1/1")
+    >>> special_table((names, [row]), 1e-6, "µm")["rows"]
+    [['A fold.', 'LP', 20.1235, 123.457, '1/1', None, None]]
+    """
+    rows = []
+    for row in records(table):
+        hz, size = row["frequency_hz"], row["max_abs_displacement_m"] / factor
+        told = [row["meaning"], row["type"], float(f"{hz:.6g}"), float(f"{size:.6g}")]
+        rows.append([*told, row["branch"], row.get("period"), row.get("impacts")])
+    columns = ["meaning", "type", "frequency_hz", f"largest displacement ({unit})"]
+    return {"columns": [*columns, "branch", "period", "impacts"], "rows": rows}
 
 
 def rounded(values: Iterable[float]) -> list[float]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -20,6 +20,7 @@ from nldyn.branches.endings import Ending
 from nldyn.branches.tables import at_known, orbit_columns
 from nldyn.io.store import save
 from nldyn.plot.diagram import save_diagram
+from nldyn.report.answer import answer_lines
 from nldyn.report.offline import Table
 from nldyn.report.page import write_page
 from nldyn.runtime.result_directory import result_directory
@@ -134,7 +135,7 @@ def write_results(
         if exploration is not None:
             write_table(folder / "coverage.csv", COVERAGE_COLUMNS, coverage_rows(exploration))
         save_diagram(diagram, folder, title=scene.title if scene else "", yscale=yscale)
-        told = summary(diagram)
+        told = {**summary(diagram), "answer": answer_lines(diagram, tables["special_points"])}
         text = json.dumps(told, indent=1, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
         if scene is not None:
@@ -218,7 +219,7 @@ def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[obje
         writer.writerows(rows)
 
 
-def summary(diagram: Diagram) -> Mapping[str, object]:
+def summary(diagram: Diagram) -> dict[str, object]:
     """Say what was computed and how exactly, as plain numbers for ``summary.json``."""
     orbits = [orbit for branch in diagram.branches for orbit in branch.points]
     return {

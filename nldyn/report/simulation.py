@@ -15,7 +15,7 @@ from nldyn.longterm.impacts import Impacts
 from nldyn.longterm.simulation import Motion
 from nldyn.orbits.history import History
 from nldyn.orbits.orbit import check_observe
-from nldyn.plot.diagram import PERIOD_COLOURS, length_unit, new_axes, save_figure
+from nldyn.plot.diagram import PERIOD_COLOURS, file_axes, length_unit, save_figure
 from nldyn.plot.longterm import plot_sweep
 from nldyn.report.results import write_table
 from nldyn.runtime.result_directory import result_directory
@@ -85,7 +85,7 @@ def plot_motion(curve: Drawn) -> Axes:
     """Draw the displacement of an interface over the time."""
     time, values = np.concatenate(curve.times), np.concatenate(curve.values)
     factor, unit = length_unit(float(abs(values).max()))
-    ax = new_axes()
+    ax = file_axes()
     ax.plot(time, values / factor, color=PERIOD_COLOURS[0], linewidth=0.8)
     ax.set_xlabel("time (s)")
     ax.set_ylabel(f"displacement of {curve.interface} ({unit})")

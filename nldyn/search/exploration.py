@@ -249,6 +249,14 @@ class Exploration:
     question: Question
     stage: Stage
 
+    def __repr__(self) -> str:
+        """One line: branches, and the share of simulated motions that they explain."""
+        low, high = self.question.range_hz
+        count = len(self.diagram.branches)
+        share = f"{100.0 * self.settled_share:.1f} % of simulated motions explained"
+        ended = "" if self.finished else ", not finished"
+        return f"<Exploration of {low:g} to {high:g} Hz: {count} branches, {share}{ended}>"
+
     @property
     def coverage(self) -> tuple[Coverage, ...]:
         """What the simulations came to, one for each frequency, ascending."""

@@ -1,7 +1,10 @@
 """What a diagram shows: stable and unstable parts, colours by period, marks."""
 
 import sys
+from pathlib import Path
+from tempfile import mkdtemp
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 from fakes import diagram, resonance
@@ -12,7 +15,14 @@ from nldyn.base.resources import example
 from nldyn.branches.continuation import continue_branch
 from nldyn.orbits.solve import solve_orbit
 from nldyn.plot.curves import _scale_and_label
-from nldyn.plot.diagram import branch_curve, length_unit, plot_diagram, plot_orbit, stability_runs
+from nldyn.plot.diagram import (
+    branch_curve,
+    length_unit,
+    plot_diagram,
+    plot_orbit,
+    save_diagram,
+    stability_runs,
+)
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene
 from nldyn.system.chart import NAMES, UNITS
@@ -157,8 +167,17 @@ def test_impacts_shorter_than_a_sample_are_marked():
         assert mark.get_xdata()[0] == orbit.impact_list[0].time
 
 
-def test_library_functions_leave_pyplot_alone():
-    assert (
-        "matplotlib.pyplot" not in sys.modules
-        or __import__("matplotlib.pyplot").pyplot.get_fignums() == []
-    )
+def test_a_picture_is_one_of_pyplot_where_that_is_in_use(monkeypatch):
+    """So that plt.show() shows it, and a notebook; elsewhere none is left open."""
+    monkeypatch.delitem(sys.modules, "matplotlib.pyplot", raising=False)
+    alone = plot_diagram(diagram()).figure
+    monkeypatch.undo()
+    from matplotlib import pyplot
+
+    before = pyplot.get_fignums()
+    with mpl.rc_context({"backend": "agg"}):
+        shown = plot_diagram(diagram()).figure
+        assert pyplot.get_fignums()[-1] == shown.number and shown.number not in before
+        pyplot.close(shown)
+        save_diagram(diagram(), Path(mkdtemp()))
+    assert not hasattr(alone, "number") and pyplot.get_fignums() == before

@@ -1,0 +1,64 @@
+"""The five lines with which a run and its report begin."""
+
+import numpy as np
+import pytest
+
+from nldyn import Stop, System, Unbalance, continue_branch, diagram, solve_orbit
+from nldyn.report.answer import answer_lines
+from nldyn.report.results import tables_of
+from nldyn.search.diagram import Diagram
+
+MASS, STIFFNESS, RATIO, UNBALANCE = 2.48, 16877.0, 0.0142, 4.92e-6
+NATURAL = np.sqrt(STIFFNESS / MASS)
+
+
+def oscillator(**more):
+    return System.from_matrices(
+        [[MASS]], [[STIFFNESS]], {"middle": [1.0]}, modal_damping=RATIO,
+        excitation=[Unbalance("middle", UNBALANCE)], **more,
+    )  # fmt: skip
+
+
+def lines_of(found):
+    return answer_lines(found, tables_of(found)["special_points"])
+
+
+def test_a_linear_resonance_has_its_peak_where_theory_says_and_is_stable_throughout():
+    """Unbalance: the peak is at ω_n / sqrt(1 - 2 ζ²), u / m / (2 ζ sqrt(1 - ζ²)) high."""
+    found = diagram(oscillator(), (10.0, 16.0), [1], search_points=1)
+    peak, force, stable, missing, jumps = lines_of(found)
+    value, unit, _, hz, *_ = peak.split(": ")[1].split()
+    exact = UNBALANCE / MASS / (2.0 * RATIO * np.sqrt(1.0 - RATIO**2))
+    assert unit == "µm" and float(value) == pytest.approx(1e6 * exact, rel=2e-3)
+    at = NATURAL / np.sqrt(1.0 - 2.0 * RATIO**2) / (2.0 * np.pi)
+    assert float(hz) == pytest.approx(at, rel=2e-3)
+    assert force.endswith("there are no stops")
+    assert stable == "stable and periodic: 10 to 16 Hz"
+    assert missing == "nothing stable was found: nowhere" and jumps == "jumps: none was found"
+
+
+def test_a_branch_that_folds_jumps_at_its_folds_and_leaves_nothing_beyond_the_flip():
+    """Hardening by a stop: up to a fold where the frequency rises, down to one where it falls."""
+    system = oscillator(stops=[Stop.linear("middle", 5e3, gap=2e-5)])
+    branch = continue_branch(solve_orbit(system, 10.0), (10.0, 18.0))
+    found = Diagram((branch,), (10.0, 18.0), "middle")
+    folds = [p.frequency_hz for p in branch.special_points if p.kind == "LP"]
+    assert len(folds) == 2
+    *_, stable, missing, jumps = lines_of(found)
+    assert stable == "stable and periodic: 10 to 18 Hz" and missing.endswith("nowhere")
+    assert jumps == (
+        f"jumps: as the frequency rises past {max(folds):.5g} Hz; "
+        f"as the frequency falls past {min(folds):.5g} Hz"
+    )
+    force = lines_of(found)[1]
+    depth = max(orbit.max_penetration for orbit in branch.points if orbit.stable)
+    assert f"{5e6 * depth:.4g} mN" in force and "(stable" in force
+
+
+def test_what_no_branch_covers_is_told(one_dof):
+    """Beyond its flip the branch is unstable."""
+    branch = continue_branch(solve_orbit(one_dof, 30.0), (30.0, 35.0))
+    (flip,) = [p.frequency_hz for p in branch.special_points if p.kind == "PD"]
+    *_, stable, missing, _ = lines_of(Diagram((branch,), (30.0, 35.0), "middle"))
+    assert stable == f"stable and periodic: 30 to {flip:.5g} Hz"
+    assert missing == f"nothing stable was found: {flip:.5g} to 35 Hz"
