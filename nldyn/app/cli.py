@@ -572,7 +572,7 @@ def backbone(
     default=0,
     show_default=True,
     metavar="N",
-    help="Excitation periods from rest before the recording, or before the run-up.",
+    help="Excitation periods before the recording, or before the run-up.",
 )
 @click.option(
     "--to-hz",
@@ -603,10 +603,11 @@ def simulate(
     exponents: bool,
     quiet: bool,
 ) -> None:
-    """Simulate a scene in time from rest, at one frequency or in a run-up or run-down.
+    """Simulate a scene in time from its [start], at one frequency or in a run-up or run-down.
 
     Writes motion.csv, the displacements and contact forces, impacts.csv, and a picture; of a
-    run-up also peaks.csv. Forces may have frequencies of their own.
+    run-up also peaks.csv. Forces may have frequencies of their own. Without a [start] the structure
+    is undeformed and without speed at first.
     """
     if (to_hz is None) != (rate_hz_per_s is None):
         raise click.UsageError("'--to-hz' and '--rate-hz-per-s' go together")

@@ -321,7 +321,7 @@ def classify_attractor(
     frequency_hz : float
         Excitation frequency in Hz.
     start : (2n,) array, optional
-        Modal displacements and velocities at forcing phase zero; at rest unless given.
+        Modal displacements and velocities at forcing phase zero; undeformed and still unless given.
     observe : str, optional
         Interface whose displacement the orbit reports; the first unless given.
     options : AttractorOptions, optional

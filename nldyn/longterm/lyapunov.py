@@ -193,7 +193,8 @@ def lyapunov_exponents(
         Excitation frequency in Hz. A list of them gives a list of spectra, each a computation of
         its own.
     start : (2n,) or (k, 2n) array, optional
-        Modal displacements and velocities at forcing phase zero; at rest unless given. One for
+        Modal displacements and velocities at forcing phase zero; undeformed and still unless
+        given. One for
         all, or one for each frequency.
     transient : int
         Excitation periods left out at the beginning.

@@ -348,7 +348,8 @@ def simulate(
     periods : int
         Excitation periods to record, at most a million: all of the motion is kept.
     start : (2n,) or (k, 2n) array, optional
-        Modal displacements and velocities at forcing phase zero; at rest unless given. One for
+        Modal displacements and velocities at forcing phase zero; undeformed and still unless
+        given. One for
         all, or one for each frequency.
     transient : int
         Excitation periods before the recording.
@@ -556,7 +557,8 @@ def sweep(
     rate_hz_per_s : float
         Size of the rate of change in Hz/s.
     start : (2n,) or (k, 2n) array, optional
-        Modal displacements and velocities at forcing phase zero; at rest unless given. One for
+        Modal displacements and velocities at forcing phase zero; undeformed and still unless
+        given. One for
         all, or one for each sweep.
     steps_per_period : int
         Steps of constant frequency in an excitation period.

@@ -162,7 +162,8 @@ def jumps_line(branches: Iterable[Branch], special_points: Table) -> str:
     """Frequencies at which a stable branch ends at a fold, or where what it meets is unstable."""
     columns, rows = special_points
     forms = iter(str(row[list(columns).index("normal_form")]) for row in rows)
-    rising, falling = set(), set()
+    rising: set[float] = set()
+    falling: set[float] = set()
     for branch in branches:
         hz, _, stable = branch_curve(branch)
         ends = {float(s.frequency_hz): (str(s.kind), next(forms)) for s in branch.special_points}

@@ -147,7 +147,8 @@ def only_simulated(scene: Scene) -> bool:
     """Whether a scene is meant for ``nldyn simulate``: no range, and loads that have no period."""
     steady = all(table.kind in STEADY for table in scene.excitation)
     several = any(table.frequency_hz is not None for table in scene.excitation)
-    return scene.continuation is None and bool(scene.excitation) and (steady or several)
+    begun = bool(scene.excitation) or scene.start is not None
+    return scene.continuation is None and begun and (steady or several)
 
 
 def check_held_to_follow(scene: Scene, system: System) -> None:
@@ -160,7 +161,14 @@ def check_held_to_follow(scene: Scene, system: System) -> None:
 def remarks(scene: Scene, system: System) -> list[str]:
     """Say what is possible but looks like a mistake in the units, or takes long."""
     beyond = _range_remark(scene, float(system.frequencies_hz.max()))
-    return [*_material_remarks(scene), *([beyond] if beyond else []), *_slow_remarks(scene, system)]
+    slow = _slow_remarks(scene, system)
+    return [*_material_remarks(scene), *([beyond] if beyond else []), *_unused(scene), *slow]
+
+
+def _unused(scene: Scene) -> Iterator[str]:
+    """Name what a search for branches passes over."""
+    if scene.start is not None and scene.continuation is not None:
+        yield "[start] is for 'nldyn simulate': branches do not depend on where a motion begins"
 
 
 def _slow_remarks(scene: Scene, system: System) -> Iterator[str]:
@@ -538,6 +546,9 @@ def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
                 yield (kind, number, "against"), entry.against
     if scene.observe is not None:
         yield ("observe", "at"), scene.observe.at
+    if scene.start is not None:
+        for kind in ("displacements", "velocities"):
+            yield from ((("start", kind, name), name) for name in getattr(scene.start, kind))
 
 
 def _points_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:

@@ -770,6 +770,20 @@ class ObserveTable(Table):
     """With a moving base: its absolute displacement, not that relative to the base."""
 
 
+class StartTable(Table):
+    """``[start]``: where ``nldyn simulate`` begins; undeformed and without speed unless given.
+
+    What is not given follows: of all states with these values it is the one of least energy.
+    """
+
+    at_rest: bool = False
+    """Begin where the structure rests under its constant loads; what is given is added to that."""
+    displacements: dict[str, Number] = {}
+    """[m or rad] By interface, such as tip = 1e-3."""
+    velocities: dict[str, Number] = {}
+    """[m/s or rad/s] By interface."""
+
+
 class ContinuationTable(Table):
     """``[continuation]``: which branches of periodic orbits are followed, and how far."""
 
@@ -927,6 +941,7 @@ class Scene(StructureTables):
     stops: list[StopTable] = []
     excitation: list[ExcitationTable] = []
     observe: ObserveTable | None = None
+    start: StartTable | None = None
     continuation: ContinuationTable | None = None
     subharmonics: list[SeedTable] = []
     explore: ExploreTable | None = None

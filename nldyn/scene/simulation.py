@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from nldyn.base.errors import SystemModelError
 from nldyn.flow.flow_map import FlowMap, FlowOptions
+from nldyn.longterm.initial_states import state_with
 from nldyn.longterm.lyapunov import LyapunovSpectrum, lyapunov_exponents
 from nldyn.longterm.simulation import Motion, simulate, sweep
 from nldyn.scene.build import build_system
@@ -39,7 +40,7 @@ def simulation_of(
     to_hz: float | None = None,
     rate_hz_per_s: float = 0.0,
 ) -> Simulation:
-    """Simulate a scene from rest, at one frequency or through a range.
+    """Simulate a scene from its ``[start]``, at one frequency or through a range.
 
     Parameters
     ----------
@@ -76,11 +77,14 @@ def simulation_of(
     """
     table = scene.continuation
     flow = FlowMap(build_system(scene), FlowOptions(table.rtol) if table else None)
+    with told_as(scene, ("start",), SystemModelError):
+        start = None if scene.start is None else state_with(flow.system, **scene.start.model_dump())
     with told_as(scene, (), SystemModelError):
         if to_hz is None:
-            motion = simulate(flow, frequency_hz, periods, transient=transient)
+            motion = simulate(flow, frequency_hz, periods, start=start, transient=transient)
         else:
-            start = simulate(flow, frequency_hz, transient).end if transient else None
+            if transient:
+                start = simulate(flow, frequency_hz, transient, start=start).end
             motion = sweep(flow, (frequency_hz, to_hz), rate_hz_per_s, start=start)
         if not exponents:
             return Simulation(motion)
