@@ -17,6 +17,7 @@ SURE = Stability(0.5 + 0.2j, -0.62, 1e-7)
 @dataclass(frozen=True)
 class FakeSystem:
     interfaces: tuple[str, ...] = ("middle",)
+    stops: tuple = ()
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,7 @@ class FakeDiagram:
     branches: list
     notes: tuple = ()
     range_hz: tuple = (5.0, 90.0)
+    observe: str = "middle"
 
     def of_period(self, period):
         return [branch for branch in self.branches if branch.period == period]
