@@ -237,7 +237,7 @@ def symmetric_matrix(matrix: Any, what: str) -> SparseMatrix:
             f"the {what} matrix is not symmetric: entries opposite each other differ by "
             f"{difference:.3g}, its largest entry being {largest:.3g}"
         )
-    return sparse.csc_array((array + array.T) * 0.5)
+    return sparse.csc_array((array + array.T) * 0.5) if difference else array
 
 
 def interface_vector(vector: Any, name: str, size: int) -> FloatArray:

@@ -57,9 +57,7 @@ class Cholesky:
 
     def __init__(self, matrix: SparseMatrix, plan: Elimination) -> None:
         self.plan = plan
-        ordered = sparse.csc_array(matrix[plan.order][:, plan.order])
-        lower = sparse.csc_array(sparse.tril(ordered, format="csc"))
-        del ordered
+        lower = lower_triangle(matrix, plan.order)
         self.diagonals: list[FloatArray] = []
         self.panels: list[FloatArray] = []
         handed: dict[int, FloatArray] = {}
@@ -92,6 +90,16 @@ class Cholesky:
         found = np.empty_like(x)
         found[self.plan.order] = x
         return found.reshape(right.shape)
+
+
+def lower_triangle(matrix: SparseMatrix, order: IntArray) -> SparseMatrix:
+    """The lower triangle of a symmetric matrix whose rows and columns are put in an order."""
+    place = np.empty(order.size, dtype=np.int32)
+    place[order] = np.arange(order.size)
+    rows, columns = place[matrix.indices], np.repeat(place, np.diff(matrix.indptr))
+    kept = rows >= columns
+    entries = (matrix.data[kept], (rows[kept], columns[kept]))
+    return sparse.csc_array(entries, shape=matrix.shape)
 
 
 def divided(factor: FloatArray, right: FloatArray, *, transposed: bool) -> FloatArray:

@@ -375,8 +375,9 @@ def lanczos_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatAr
     room, used, looked = np.empty((size, 0), order="F"), 0, 0
     projected = np.zeros((0, 0))
     image = shifted.factor.solve(times(mass, start))
+    weighted = times(mass, image)
     while True:
-        fresh, outside = next_block(room[:, :used], image, mass)
+        fresh, heavy, outside = next_block(room[:, :used], image, weighted, mass)
         if used and (used < LOOK_ALWAYS or used >= LOOK_AGAIN * looked or not fresh.shape[1]):
             looked = used
             nu, turn = linalg.eigh(projected)
@@ -391,8 +392,9 @@ def lanczos_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatAr
             room = larger
         room[:, used : used + fresh.shape[1]] = fresh
         used += fresh.shape[1]
-        image = shifted.factor.solve(times(mass, fresh))
-        columns = room[:, :used].T @ times(mass, image)
+        image = shifted.factor.solve(heavy)
+        weighted = times(mass, image)
+        columns = room[:, :used].T @ weighted
         corner = columns[-fresh.shape[1] :]
         above = columns[: -fresh.shape[1]]
         projected = np.block([[projected, above], [above.T, (corner + corner.T) / 2]])
@@ -402,29 +404,38 @@ def lanczos_modes(pencil: Pencil, shifted: Shifted, count: int) -> tuple[FloatAr
 
 
 def next_block(
-    basis: FloatArray, image: FloatArray, mass: SparseMatrix
-) -> tuple[FloatArray, FloatArray]:
+    basis: FloatArray, image: FloatArray, weighted: FloatArray, mass: SparseMatrix
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """What ``image`` (N, b) adds to a mass-orthonormal basis (N, m), and its coordinates there.
 
-    Directions at rounding level of the image are left out.
+    Directions at rounding level of the image are left out. ``weighted`` is M times the image; the
+    second result is M times the first.
     """
-    size = np.sqrt(np.maximum(np.sum(image * times(mass, image), axis=0), 0.0))
+    size = np.sqrt(np.maximum(np.sum(image * weighted, axis=0), 0.0))
     for _ in range(2):
-        image = image - basis @ (basis.T @ times(mass, image))
-    norms = np.sqrt(np.maximum(np.sum(image * times(mass, image), axis=0), 0.0))
-    image = np.divide(image, norms, out=np.zeros_like(image), where=norms > 10 * EPS * size)
-    share, directions = linalg.eigh(image.T @ times(mass, image))
-    directions = directions[:, share > DEPENDENT]
-    fresh = image @ (directions / np.sqrt(share[share > DEPENDENT]))
-    fresh = fresh - basis @ (basis.T @ times(mass, fresh))
-    fresh = mass_orthonormal(fresh, mass)
-    return fresh, (fresh.T @ times(mass, image)) * norms
+        image = image - basis @ (basis.T @ weighted)
+        weighted = times(mass, image)
+    norms = np.sqrt(np.maximum(np.sum(image * weighted, axis=0), 0.0))
+    inverse = np.divide(1.0, norms, out=np.zeros_like(norms), where=norms > 10 * EPS * size)
+    image, weighted = image * inverse, weighted * inverse
+    share, directions = linalg.eigh(image.T @ weighted)
+    directions = directions[:, share > DEPENDENT] / np.sqrt(share[share > DEPENDENT])
+    fresh = image @ directions
+    fresh = fresh - basis @ (basis.T @ (weighted @ directions))
+    heavy = times(mass, fresh)
+    turn = nearly_orthonormal(fresh.T @ heavy)
+    fresh, heavy = fresh @ turn, heavy @ turn
+    return fresh, heavy, (heavy.T @ image) * norms
 
 
 def mass_orthonormal(vectors: FloatArray, mass: SparseMatrix) -> FloatArray:
     """The vectors nearest to those given with ``V^T M V = I`` (one Newton step, symmetric)."""
-    gram = vectors.T @ times(mass, vectors)
-    return vectors @ (1.5 * np.eye(gram.shape[0]) - 0.5 * gram)
+    return vectors @ nearly_orthonormal(vectors.T @ times(mass, vectors))
+
+
+def nearly_orthonormal(gram: FloatArray) -> FloatArray:
+    """What makes vectors whose products (k, k) are nearly 1 orthonormal to second order."""
+    return np.asarray(1.5 * np.eye(gram.shape[0]) - 0.5 * gram)
 
 
 def refined(pencil: Pencil, shifted: Shifted, squares: FloatArray, vectors: FloatArray) -> Modes:

@@ -132,12 +132,14 @@ def factorise(matrix: SparseMatrix, dense_suspect: float = DENSE_SUSPECT) -> Fac
         If the factor needs more memory than there is, before it is computed, or the solver that
         is asked for is not there or fails.
     """
+    matrix = sparse.csc_array(matrix)
     diagonal = matrix.diagonal()
     if np.any(diagonal <= 0.0):
         return None
     scale = 1.0 / np.sqrt(diagonal)
-    scaling = sparse.diags_array(scale)
-    scaled = sparse.csc_array(scaling @ matrix @ scaling)
+    data = matrix.data * scale[matrix.indices]
+    data *= np.repeat(scale, np.diff(matrix.indptr))
+    scaled = sparse.csc_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
     small = scaled.shape[0] <= DENSE_LIMIT
     found = dense_solver(scaled, dense_suspect) if small else chosen_solver(scaled)
     if found is None:
