@@ -40,6 +40,7 @@ from nldyn.flow.kernels.layout import (
     RELEASE,
     RELEASED,
     STIFFNESS,
+    SUM_ROUNDING,
 )
 from nldyn.flow.kernels.panel import node_outputs, panel_end, solve_panel
 from nldyn.flow.kernels.resolution import (
@@ -470,10 +471,14 @@ def coarsest_instant(fl):
 
 @inner
 def at_switch(fl, stop, w, phase, allowed, closed):
-    """Whether a stop is just about to switch, to within a time allowed or rounding."""
+    """Whether a stop is just about to switch, to within a time allowed or rounding.
+
+    Of the state, and of the time: an instant is known no better than its phase.
+    """
     value, speed, _ = watched_pace(fl, stop, closed, w, phase)
     out = watched(fl, stop, closed, w, phase)
-    return abs(value) <= allowed * abs(speed) + 10.0 * output_noise(fl, out, w)
+    instant = allowed + 10.0 * SUM_ROUNDING * phase / fl.omega
+    return abs(value) <= instant * abs(speed) + 10.0 * output_noise(fl, out, w)
 
 
 @inner
@@ -511,7 +516,7 @@ def instant_with(fl, aim, w, phase, h, closed):
 def stop_at_switch(fl, w, phase, h, closed):
     """Stop that is to open or close now, to within a share of a length h of time, or -1."""
     stop, nearest = -1, np.inf
-    allowed = 10.0 * coarsest_instant(fl) * h
+    allowed = 10.0 * (coarsest_instant(fl) * h + SUM_ROUNDING * phase / fl.omega)
     for s in range(closed.size):
         if is_bond(fl, s) or (is_rigid(fl, s) and closed[s]):
             continue

@@ -213,6 +213,32 @@ def test_three_accuracies_agree_on_random_systems(stops):
             assert np.abs(other - jacobian).max() < 1e-4 * growth
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12, 1e-13])
+def test_stops_at_one_place_act_as_one_of_their_stiffnesses(rtol):
+    """Rounding of the instant may carry the body a little into one of them before the other."""
+    rng = np.random.default_rng(7)
+    for _ in range(60):
+        n, p = int(rng.integers(1, 4)), float(rng.choice([1.0, 1.5, 2.0]))
+        stiffness = 10.0 ** rng.uniform(7.0, 10.0, int(rng.integers(2, 4))) * 4e-6 ** (1.5 - p)
+        gap = float(rng.choice([0.0, 3e-6]))
+        hz, share, ratio = 10.0 ** rng.uniform(1, 2.7, n), rng.uniform(0.2, 1, n), 0.01
+        drive = [Unbalance("m", 10 ** rng.uniform(-6, -4))]
+        x0 = np.concatenate([-rng.uniform(0.0, 1e-4, n), rng.uniform(0.0, 1e-2, n)])
+        phases, omega = (0.4, 0.4 + rng.uniform(0.5, 6.3)), 2 * np.pi * rng.uniform(5, 80)
+        (end, jacobian, _), (other, _, _) = (
+            flow_and_jacobian(
+                System.from_modal(
+                    hz, {"m": share}, modal_damping=ratio, excitation=drive,
+                    stops=[Stop("m", k, p, gap) for k in parts],
+                ),
+                x0, phases, omega, FlowOptions(rtol=rtol),
+            )
+            for parts in (stiffness, [stiffness.sum()])
+        )  # fmt: skip
+        growth = max(1.0, np.abs(jacobian).max())
+        assert np.abs(end - other).max() < 10.0 * max(rtol, 1e-11) * growth * np.abs(other).max()
+
+
 @pytest.mark.parametrize(
     ("exponents", "seed"),
     [((1.37, 3.0, 1.0), 3), ((1.2, 1.5, 2.0), 3), ((1.2, 1.5, 2.0), 5), ((1.0, 2.5, 1.5), 3)],
