@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 DOCS = Path(__file__).parents[3] / "docs" / "how-to"
+PAGES = ["lyapunov", "basins", "cluster", "initial_states"]
 
 
-@pytest.mark.parametrize(
-    "page", ["lyapunov", "basins", "cluster", pytest.param("simulation", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("page", [*PAGES, pytest.param("simulation", marks=pytest.mark.slow)])
 def test_examples_print_what_they_say(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
