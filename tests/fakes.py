@@ -17,7 +17,8 @@ SURE = Stability(0.5 + 0.2j, -0.62, 1e-7)
 @dataclass(frozen=True)
 class FakeSystem:
     interfaces: tuple[str, ...] = ("middle",)
-    stops: tuple = ()
+    stops: tuple[object, ...] = ()
+    frequencies_hz: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

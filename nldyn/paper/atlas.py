@@ -191,7 +191,7 @@ def summed_up(branches: Sequence[Branch], notes: Sequence[str]) -> list[str]:
 
 def _chart_row(chart: Chart, found: Diagram, folder: Path) -> list[object]:
     """Draw a chart; what the table tells of it."""
-    ax = plot_diagram(found, special_points=(), unit="mm", hover=False)
+    ax = plot_diagram(found, special_points=(), unit="mm", references=False, hover=False)
     figure = ax.get_figure(root=True)
     assert figure is not None
     figure.set_size_inches(TALL, 0.4 * TALL)

@@ -108,7 +108,7 @@ def write_figures(results: Results, folder: Path, chaos: Chaos | None = None) ->
 
 
 def _diagram(branches: Iterable[Branch], heading: str) -> Axes:
-    ax = plot_diagram(branches, special_points=(), unit="mm")
+    ax = plot_diagram(branches, special_points=(), unit="mm", references=False)
     ax.set_xlim(0.0, 90.0)
     ax.set_title(heading)
     return ax
@@ -142,7 +142,7 @@ def _inset(
     """Enlarge a range of frequencies where the diagram is empty."""
     low, high = range_hz
     small = ax.inset_axes(bounds)
-    plot_diagram(branches, small, special_points=(), unit="mm", legend=False)
+    plot_diagram(branches, small, special_points=(), unit="mm", references=False, legend=False)
     tops = [
         1e3 * o.max_abs_displacement
         for b in branches

@@ -20,6 +20,7 @@ from nldyn.plot.diagram import (
     new_axes,
     stability_runs,
 )
+from nldyn.plot.words import displacement_of
 from nldyn.system.chart import UNITS
 from nldyn.system.parameters import Parameter
 
@@ -131,7 +132,7 @@ def plot_orbit_curve(curve: Curve, ax: Axes | None = None) -> Axes:
     ...     excitation=[Unbalance("middle", 4.92e-6)])
     >>> ax = plot_orbit_curve(continue_orbit(solve_orbit(system, 20.0), "gap", (1e-6, 1e-5)))
     >>> ax.get_xlabel(), ax.get_ylabel()
-    ('gap (µm)', 'max |y| at middle (µm)')
+    ('gap (µm)', 'largest displacement of middle (µm)')
     """
     if not (isinstance(curve, Curve) and len(curve.parameters) == 1):
         raise SystemModelError(
@@ -162,7 +163,7 @@ def plot_orbit_curve(curve: Curve, ax: Axes | None = None) -> Axes:
             x_marks, y_marks = zip(*places, strict=True)
             ax.plot(x_marks, y_marks, label=f"{MARKER_NAMES[kind]} ({kind})", **mark_style(kind))
     ax.set_xlabel(label)
-    ax.set_ylabel(f"max |y| at {orbits[0].observe} ({unit})")
+    ax.set_ylabel(f"largest {displacement_of(orbits[0].observe)} ({unit})")
     ax.legend(frameon=False)
     return ax
 

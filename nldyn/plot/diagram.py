@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from nldyn.base.errors import check_choice, check_types
 from nldyn.branches.branch import check_branches
 from nldyn.plot.hover import show_labels
+from nldyn.plot.words import ANGLES, LENGTHS, displacement_of, units_of
 from nldyn.runtime.progress import in_notebook
 from nldyn.system.naming import stop_name
 from nldyn.system.rigid_stop import AnyStop
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from nldyn.search.diagram import Diagram
     from nldyn.system.system import System
 
+REFERENCE = "#8a5a00"  # of stops in diagrams
 STABLE: Literal["-"] = "-"
 UNSTABLE = (0.0, (1.0, 1.4))
 # Okabe and Ito's colours, told apart by colour-blind readers; dark ones first.
@@ -50,7 +52,7 @@ MARKER_NAMES = {
     "BP": "branch point",
     "GR": "grazing",
 }
-PREFIXES = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
+MANY_MARKS = 60  # special points, of which only those beside stable orbits are marked
 SVG_SALT = "nldyn"
 
 
@@ -140,7 +142,7 @@ def length_unit(largest: float) -> tuple[float, str]:
     >>> length_unit(2.3e-4)
     (1e-06, 'µm')
     """
-    return axis_unit(largest, PREFIXES)
+    return axis_unit(largest, LENGTHS)
 
 
 def axis_unit(largest: float, units: Sequence[tuple[float, str]]) -> tuple[float, str]:
@@ -202,6 +204,8 @@ def plot_diagram(
     yscale: Literal["linear", "log"] = "linear",
     special_points: Sequence[str] = tuple(MARKERS),
     unit: str | None = None,
+    direction: str = "",
+    references: bool = True,
     legend: bool = True,
     hover: bool = True,
 ) -> Axes:
@@ -216,9 +220,16 @@ def plot_diagram(
     yscale : {"linear", "log"}
         Scale of the displacement axis.
     special_points : sequence of str
-        Kinds to mark, out of LP, PD, NS, BP and GR.
+        Kinds to mark, out of LP, PD, NS, BP and GR. Of more than 60 points only those beside a
+        stable orbit are marked, and the legend says how many of how many.
     unit : {"m", "mm", "µm", "nm"}, optional
-        Unit of the displacement axis; chosen by the largest value unless given.
+        Unit of the displacement axis, or of a rotation "rad", "mrad", "µrad" or "nrad"; chosen by
+        the largest value unless given.
+    direction : str
+        That of the interface, such as "y" or "rotation_z", for the words of the axis.
+    references : bool
+        Whether to draw where the interface meets its stops, and the natural frequencies without
+        contact.
     legend : bool
         Whether to explain colours, lines and marks.
     hover : bool
@@ -243,7 +254,7 @@ def plot_diagram(
     >>> branch = continue_branch(solve_orbit(system, frequency_hz=10.0), (5.0, 20.0))
     >>> ax = plot_diagram([branch])
     >>> ax.get_ylabel()
-    'max |y| at middle (µm)'
+    'largest displacement of middle (µm)'
     """
     several = getattr(diagram, "branches", diagram)
     branches = list(several if isinstance(several, Iterable) else [several])
@@ -253,32 +264,77 @@ def plot_diagram(
     for kind in special_points:
         check_choice("special_points", kind, MARKERS)
     ax = ax if ax is not None else new_axes()
-    factor, unit = _unit_of(branches, unit)
+    factor, unit = _unit_of(branches, unit, direction)
     colours = period_colours(branch.period for branch in branches)
     for branch in branches:
         _draw_branch(ax, branch, colours[branch.period], factor)
-    size = mark_size(sum(len(branch.special_points) for branch in branches))
-    marked = [kind for kind in special_points if _draw_marks(ax, branches, kind, factor, size)]
+    marked = marked_points(branches, special_points)
+    size = mark_size(sum(len(points) for points in marked.values()))
+    for kind, points in marked.items():
+        _draw_marks(ax, points, kind, factor, size)
     ax.set_xlabel("excitation frequency (Hz)")
-    ax.set_ylabel(f"max |y|{_observed(branches)} ({unit})")
+    observed = observed_interface(branches)
+    ax.set_ylabel(f"largest {displacement_of(observed, direction)} ({unit})")
     ax.set_yscale(yscale)
     if yscale == "linear":
         ax.set_ylim(bottom=-0.02 * ax.get_ylim()[1])
+    lines = draw_references(ax, branches, factor, unit) if references and observed else []
     if legend and branches:
-        draw_legend(ax, colours, branches, marked)
+        draw_legend(ax, colours, branches, marked, lines)
     if hover:
         _label_orbits(ax, branches, marked, factor, unit)
     return ax
 
 
-def _observed(branches: Sequence[Branch]) -> str:
-    """Where the displacement is taken, in words, if that is one interface."""
+def observed_interface(branches: Sequence[Branch]) -> str:
+    """The interface whose displacement is drawn; empty if the branches have several."""
     places = {branch.nodes[0].orbit.observe for branch in branches}
-    return f" at {places.pop()}" if len(places) == 1 else ""
+    return places.pop() if len(places) == 1 else ""
+
+
+def marked_points(
+    branches: Sequence[Branch], kinds: Iterable[str], many: int = MANY_MARKS
+) -> dict[str, list[SpecialPoint]]:
+    """The special points to mark, by kind: all, or of many those beside a stable orbit."""
+    all_points = [(branch, point) for branch in branches for point in branch.special_points]
+    all_points = [pair for pair in all_points if pair[1].kind in kinds]
+    if len(all_points) > many:
+        all_points = [pair for pair in all_points if beside_stable(*pair)]
+    found = {kind: [p for _, p in all_points if p.kind == kind] for kind in kinds}
+    return {kind: points for kind, points in found.items() if points}
+
+
+def draw_references(ax: Axes, branches: Sequence[Branch], factor: float, unit: str) -> list[Line2D]:
+    """Draw stops of the observed interface and natural frequencies, as far as the axes reach.
+
+    They change no limit of the axes. Entries for a legend are given.
+    """
+    system, name = branches[0].nodes[0].orbit.system, branches[0].nodes[0].orbit.observe
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    gap: dict[str, Any] = {"color": REFERENCE, "linewidth": 0.9, "linestyle": "-."}
+    linear: dict[str, Any] = {"color": "0.6", "linewidth": 0.9, "linestyle": (0, (5, 3))}
+    entries = []
+    for place in sorted({abs(place) / factor for place in stop_places(system, name)}):
+        if max(low, 0.0) < place < high:
+            ax.axhline(place, zorder=1, **gap)
+            entries.append(Line2D([], [], label=f"gap of a stop, {place:.4g} {unit}", **gap))
+    natural = [hz for hz in system.frequencies_hz if left < hz < right]
+    for hz in natural:
+        ax.axvline(hz, zorder=1, **linear)
+    if natural:
+        told = ", ".join(f"{hz:.4g}" for hz in natural[:4]) + (", ..." if natural[4:] else "")
+        entries.append(Line2D([], [], label=f"natural, no contact:\n{told} Hz", **linear))
+    ax.set_xlim(left, right)
+    ax.set_ylim(low, high)
+    return entries
 
 
 def plot_orbit(
-    orbit: Orbit, axes: tuple[Axes, Axes] | None = None, *, samples: int = 4000
+    orbit: Orbit,
+    axes: tuple[Axes, Axes] | None = None,
+    *,
+    direction: str = "",
+    samples: int = 4000,
 ) -> tuple[Axes, Axes]:
     """Draw displacement and contact force of an orbit over one of its periods.
 
@@ -288,6 +344,8 @@ def plot_orbit(
         A periodic orbit.
     axes : pair of matplotlib.axes.Axes, optional
         Where to draw displacement and force; a new figure unless given.
+    direction : str
+        That of the observed interface, such as "y", for the words of the axis.
     samples : int
         Number of equal time steps.
 
@@ -310,7 +368,10 @@ def plot_orbit(
     history = orbit.history(samples)
     upper, lower = axes if axes is not None else new_axes_pair()
     places = stop_places(orbit.system, orbit.observe)
-    _draw_displacement(upper, history.time, history.displacement[orbit.observe], places)
+    words = displacement_of(orbit.observe, direction)
+    y = history.displacement[orbit.observe]
+    _draw_displacement(upper, history.time, y, places, words, units_of(direction))
+    upper.tick_params(labelbottom=True)
     _draw_forces(lower, history.time, history.force, orbit.system.stops)
     _mark_deepest((upper, lower), [impact.time for impact in orbit.impact_list])
     upper.set_title(orbit_title(orbit))
@@ -337,10 +398,11 @@ def save_diagram(
     directory: str | Path,
     *,
     title: str = "",
+    direction: str = "",
     yscale: Literal["linear", "log"] = "linear",
 ) -> None:
     """Write ``diagram.png`` and ``diagram.svg`` to a directory that exists."""
-    ax = plot_diagram(diagram, file_axes(), yscale=yscale)
+    ax = plot_diagram(diagram, file_axes(), direction=direction, yscale=yscale)
     ax.set_title(title, parse_math=False)
     save_figure(ax, Path(directory) / "diagram")
 
@@ -403,15 +465,11 @@ def _draw_branch(ax: Axes, branch: Branch, colour: str, factor: float) -> None:
 
 
 def _draw_marks(
-    ax: Axes, branches: Sequence[Branch], kind: str, factor: float, size: float
-) -> bool:
-    points = [p for branch in branches for p in branch.special_points if p.kind == kind]
-    if not points:
-        return False
+    ax: Axes, points: Sequence[SpecialPoint], kind: str, factor: float, size: float
+) -> None:
     hz = [float(point.orbit.frequency_hz) for point in points]
     y = [float(point.orbit.max_abs_displacement) / factor for point in points]
     ax.plot(hz, y, **mark_style(kind, size))
-    return True
 
 
 def mark_style(kind: str, size: float = 4.5) -> dict[str, Any]:
@@ -434,7 +492,7 @@ def mark_style(kind: str, size: float = 4.5) -> dict[str, Any]:
 
 
 def _label_orbits(
-    ax: Axes, branches: Sequence[Branch], marked: Sequence[str], factor: float, unit: str
+    ax: Axes, branches: Sequence[Branch], marked: Iterable[str], factor: float, unit: str
 ) -> None:
     """Let special points, which come first, and points show what they are."""
     entries = [
@@ -464,40 +522,51 @@ def orbit_text(orbit: Orbit, factor: float, unit: str, *, stability: bool = True
     word = ("stable, " if orbit.stable else "unstable, ") if stability else ""
     impacts = f"{orbit.impacts} impact{'' if orbit.impacts == 1 else 's'}"
     return (
-        f"{orbit.frequency_hz:.7g} Hz, max |y| {orbit.max_abs_displacement / factor:.5g} {unit}\n"
+        f"{orbit.frequency_hz:.7g} Hz, largest {orbit.max_abs_displacement / factor:.5g} {unit}\n"
         f"{word}largest multiplier {abs(orbit.largest_multiplier):.4g}, {impacts}"
     )
 
 
 def draw_legend(
-    ax: Axes, colours: dict[int, str], branches: Sequence[Branch], marked: Sequence[str]
+    ax: Axes,
+    colours: dict[int, str],
+    branches: Sequence[Branch],
+    marked: Mapping[str, Sequence[SpecialPoint]],
+    others: Sequence[Line2D] = (),
 ) -> None:
-    """Explain colours, lines and the marked kinds of special points."""
+    """Explain colours, lines and the special points that are marked, and then other lines."""
     periods = sorted({branch.period for branch in branches})
     entries = [Line2D([], [], color=colours[p], label=period_name(p)) for p in periods]
     entries += [
         Line2D([], [], color="0.3", linestyle=STABLE, label="stable"),
         Line2D([], [], color="0.3", linestyle=UNSTABLE, label="unstable"),
     ]
-    for kind in marked:
-        label = f"{MARKER_NAMES[kind]} ({kind})"
+    for kind, points in marked.items():
+        count = sum(p.kind == kind for branch in branches for p in branch.special_points)
+        shown = f", {len(points)} of {count}" if len(points) < count else ""
+        label = f"{MARKER_NAMES[kind]} ({kind}){shown}"
         entries.append(Line2D([], [], label=label, **mark_style(kind)))
-    ax.legend(handles=entries, **BESIDE)
+    ax.legend(handles=[*entries, *others], **BESIDE)
 
 
 def _draw_displacement(
-    ax: Axes, time: NDArray[np.float64], y: NDArray[np.float64], places: Sequence[float]
+    ax: Axes,
+    time: NDArray[np.float64],
+    y: NDArray[np.float64],
+    places: Sequence[float],
+    words: str,
+    units: Sequence[tuple[float, str]],
 ) -> None:
     """Draw it with those of the stops that are neither at zero, where a line is, nor far off."""
     reach = float(np.abs(y).max())
-    factor, unit = length_unit(reach)
+    factor, unit = axis_unit(reach, units)
     ax.axhline(0.0, color="0.6", linewidth=0.6)
     ax.plot(time, y / factor, color=PERIOD_COLOURS[0], linewidth=1.4)
     shown = [place for place in places if 0.0 < abs(place) <= 1.5 * reach]
     for number, place in enumerate(shown):
         label = "stop" if number == 0 else None
         ax.axhline(place / factor, color=PERIOD_COLOURS[1], linestyle="-.", label=label)
-    ax.set_ylabel(f"displacement ({unit})")
+    ax.set_ylabel(f"{words} ({unit})")
 
 
 def _draw_forces(
@@ -522,9 +591,10 @@ def _mark_deepest(axes: Sequence[Axes], times: Sequence[float]) -> None:
         axes[0].legend(fontsize="small", loc="upper right")
 
 
-def _unit_of(branches: Sequence[Branch], unit: str | None) -> tuple[float, str]:
+def _unit_of(branches: Sequence[Branch], unit: str | None, direction: str) -> tuple[float, str]:
     if unit is None:
         largest = [float(np.max(b.max_abs_displacement)) for b in branches if len(b.points)]
-        return length_unit(max(largest, default=1.0))
-    check_choice("unit", unit, (name for _, name in PREFIXES))
-    return next(prefix for prefix in PREFIXES if prefix[1] == unit)
+        return axis_unit(max(largest, default=1.0), units_of(direction))
+    units = (*LENGTHS, *ANGLES)
+    check_choice("unit", unit, (name for _, name in units))
+    return next(prefix for prefix in units if prefix[1] == unit)

@@ -24,7 +24,6 @@ from nldyn.longterm.simulation import Motion
 from nldyn.orbits.orbit import check_observe, stroboscopic
 from nldyn.plot.diagram import (
     PERIOD_COLOURS,
-    PREFIXES,
     STABLE,
     UNSTABLE,
     draw_legend,
@@ -34,6 +33,7 @@ from nldyn.plot.diagram import (
     plot_diagram,
     stability_runs,
 )
+from nldyn.plot.words import LENGTHS
 from nldyn.search.diagram import Diagram
 
 KIND_COLOURS = {
@@ -54,7 +54,7 @@ QUANTITIES = {
 }
 WEAR_MARKS = "o^sDv"  # of measures, in their order: all can be hollow
 MOST_DECADES = 16  # beyond the digits of a number
-UNITS = {name: factor for factor, name in PREFIXES}
+UNITS = {name: factor for factor, name in LENGTHS}
 
 
 def plot_section(
@@ -156,7 +156,7 @@ def plot_brute_force(
         factor, name = UNITS[unit], unit
     ax = ax if ax is not None else new_axes()
     if branches and quantity == "peak":
-        plot_diagram(branches, ax, special_points=(), unit=name)
+        plot_diagram(branches, ax, special_points=(), unit=name, references=False)
     elif branches:
         _draw_strobes(ax, branches, found.observe, factor)
     shade_ranges(ax, found.ranges())
@@ -243,7 +243,7 @@ def _draw_strobes(ax: Axes, branches: Sequence[Branch], interface: str, factor: 
                 hz[part], values[part] / factor, color=colours[branch.period], linewidth=1.4,
                 linestyle=style,
             )  # fmt: skip
-    draw_legend(ax, colours, branches, ())
+    draw_legend(ax, colours, branches, {})
 
 
 def shade_ranges(ax: Axes, ranges: Sequence[tuple[float, float]], colour: str = SHADE) -> None:
@@ -294,7 +294,7 @@ def plot_sweep(
     ax = ax if ax is not None else new_axes()
     if diagram is not None:
         branches = diagram if isinstance(diagram, Diagram) else list(diagram)
-        plot_diagram(branches, ax, special_points=(), unit=unit)
+        plot_diagram(branches, ax, special_points=(), unit=unit, references=False)
     before = ax.get_legend()
     handles: list[Any] = list(before.legend_handles) if before is not None else []
     for motion, (hz, peaks) in zip(listed, curves, strict=True):

@@ -19,7 +19,7 @@ function digits(value, count = 6) {
   const short = Number(value.toPrecision(count)), size = Math.abs(short);
   return size >= 1e-3 && size < 1e9 ? String(short) : short.toExponential().replace("e+", "e");
 }
-const LENGTHS = [[1, "m"], [1e-3, "mm"], [1e-6, "µm"], [1e-9, "nm"]];
+const LENGTHS = [[1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]].map(([factor, prefix]) => [factor, prefix + (data.angle ? "rad" : "m")]);
 const FORCES = [[1e6, "MN"], [1e3, "kN"], [1, "N"], [1e-3, "mN"], [1e-6, "µN"]];
 const most = (values) => values.reduce((found, value) => Math.max(found, Math.abs(value)), 0);
 function unitOf(largest, units, share = 1) {

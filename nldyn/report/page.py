@@ -14,14 +14,17 @@ import numpy.typing as npt
 
 from nldyn.branches.branch import Branch
 from nldyn.plot.diagram import (
+    MANY_MARKS,
     MARKER_NAMES,
+    axis_unit,
+    beside_stable,
     branch_curve,
-    length_unit,
     orbit_text,
     period_colours,
     period_name,
     stability_runs,
 )
+from nldyn.plot.words import displacement_of, is_angle, units_of
 from nldyn.report.deflection import surface_content
 from nldyn.report.offline import Table, as_table, versions, write_html
 from nldyn.report.orbit_content import (
@@ -34,12 +37,14 @@ from nldyn.report.orbit_content import (
     samples_each,
     stops_of,
 )
+from nldyn.scene.build import direction_at
 from nldyn.search.diagram import Diagram
 
 if TYPE_CHECKING:
     import cms
     from fem.render import StopSphere
     from fem.render.pictures import AnyComponent
+    from nldyn.bifurcations.point import SpecialPoint
     from nldyn.orbits.orbit import Orbit
     from nldyn.scene.schema import Scene
 
@@ -123,7 +128,8 @@ def page_content(
     branches = diagram.branches
     told = told_branches(diagram, tables)
     heights = [[node.orbit.max_abs_displacement for node in branch.nodes] for branch in told]
-    factor, unit = length_unit(max((max(y) for y in heights), default=1.0))
+    direction = direction_at(scene, diagram.observe) if scene else ""
+    factor, unit = axis_unit(max((max(y) for y in heights), default=1.0), units_of(direction))
     chosen = chosen_orbits(branches, heights)
     kept = kept_points(branches)
     notes = [*notes, *dict.fromkeys(diagram.notes), *limits(diagram, chosen, kept)]
@@ -133,7 +139,10 @@ def page_content(
         "title": (scene.title if scene else "") or "Bifurcation diagram",
         "answer": summary.get("answer", []),
         "range_hz": list(diagram.range_hz),
-        "observe": diagram.observe,
+        "observed": displacement_of(diagram.observe, direction),
+        "angle": is_angle(direction),
+        "natural_hz": branches[0].points[0].system.frequencies_hz.tolist() if branches else [],
+        "many": MANY_MARKS,
         "factor": factor,
         "unit": unit,
         "yscale": yscale,
@@ -319,6 +328,7 @@ def special_marks(branches: Sequence[ToldBranch], factor: float, unit: str) -> l
             "branch": number,
             "index": index,
             "kind": special.kind,
+            "beside_stable": beside_stable(cast("Branch", branch), cast("SpecialPoint", special)),
             "x": float(f"{special.orbit.frequency_hz:.9g}"),
             "y": float(f"{special.orbit.max_abs_displacement / factor:.9g}"),
             "sentence": special.meaning,

@@ -19,7 +19,7 @@ from nldyn.report.results import write_table
 from nldyn.report.stop_spheres import stop_sphere, stops_to_draw
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.runtime.result_directory import result_directory
-from nldyn.scene.build import Structure, build_structure, build_system
+from nldyn.scene.build import Structure, build_structure, build_system, direction_at
 from nldyn.scene.checks import check_computable
 from nldyn.scene.messages import scene_error
 
@@ -143,7 +143,7 @@ def render_scene(
         write_table(folder / "modes.csv", table.columns(), table.rows())
         (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
         if orbit is not None:
-            save_orbit(orbit, folder)
+            save_orbit(orbit, folder, direction_at(scene, orbit.observe))
         tell = shares.part("pictures")
         drawing = Drawing.of(scene, structure, folder, modes, view, tell)
         assert drawing is not None  # there is a mesh
@@ -304,11 +304,11 @@ def save_mac(against: Comparison, folder: Path) -> None:
     save_figure(ax, folder / "mac")
 
 
-def save_orbit(orbit: Orbit, folder: Path) -> None:
+def save_orbit(orbit: Orbit, folder: Path, direction: str = "") -> None:
     """Draw displacement and contact force over time, as ``orbit.png`` and ``orbit.svg``."""
     from nldyn.plot.diagram import plot_orbit, save_figure
 
-    save_figure(plot_orbit(orbit)[0], folder / "orbit")
+    save_figure(plot_orbit(orbit, direction=direction)[0], folder / "orbit")
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from nldyn.report.answer import answer_lines
 from nldyn.report.offline import Table
 from nldyn.report.page import write_page
 from nldyn.runtime.result_directory import result_directory
+from nldyn.scene.build import direction_at
 from nldyn.search.exploration import Exploration
 
 if TYPE_CHECKING:
@@ -134,7 +135,9 @@ def write_results(
         save(found, folder / "branches.h5")
         if exploration is not None:
             write_table(folder / "coverage.csv", COVERAGE_COLUMNS, coverage_rows(exploration))
-        save_diagram(diagram, folder, title=scene.title if scene else "", yscale=yscale)
+        title = scene.title if scene else ""
+        direction = direction_at(scene, diagram.observe) if scene else ""
+        save_diagram(diagram, folder, title=title, direction=direction, yscale=yscale)
         told = {**summary(diagram), "answer": answer_lines(diagram, tables["special_points"])}
         text = json.dumps(told, indent=1, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")

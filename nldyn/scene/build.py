@@ -261,6 +261,16 @@ def place(interface: str) -> tuple[str, str]:
     return component, name
 
 
+def direction_at(scene: Scene, interface: str) -> str:
+    """The direction of an interface of a scene; empty where none is told."""
+    part, name = scene, interface
+    if scene.components:
+        component, name = place(interface)
+        part = scene.component_scenes[component]
+    given = part.matrices.interfaces if part.matrices is not None else part.interfaces
+    return getattr(given.get(name), "direction", None) or ""
+
+
 def build_candidates(scene: Scene, component: AnyComponent | None = None) -> Candidates:
     """The modes among which a scene with a tolerance chooses, by its linear response alone.
 

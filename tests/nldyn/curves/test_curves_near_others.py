@@ -119,7 +119,7 @@ def test_orbits_over_a_parameter_are_drawn_with_their_special_points():
     assert "LP" in kinds
     ax = plot_orbit_curve(curve)
     assert ax.get_xlabel() == "gap (mm)"
-    assert ax.get_ylabel().startswith("max |y| at m (")
+    assert ax.get_ylabel().startswith("largest displacement of m (")
     lines = {line.get_label(): line for line in ax.lines if not line.get_label().startswith("_")}
     assert {"stable", "unstable", "cyclic fold (LP)"} <= set(lines)
     assert lines["stable"].get_linestyle() == "-" != lines["unstable"].get_linestyle()

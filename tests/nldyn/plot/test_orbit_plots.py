@@ -157,7 +157,7 @@ def test_special_points_and_orbits_of_a_diagram_tell_their_numbers(harmonic_bran
     assert flip.kind == "PD"
     move(ax, flip.frequency_hz, 1e6 * flip.orbit.max_abs_displacement)
     (note,) = ax.texts
-    assert note.get_text().startswith("harmonic, flip (PD)\n33.65436 Hz, max |y| 7.516 µm\n")
+    assert note.get_text().startswith("harmonic, flip (PD)\n33.65436 Hz, largest 7.516 µm\n")
     peak = int(np.argmax(harmonic_branch.max_abs_displacement))
     orbit = harmonic_branch.points[peak]
     move(ax, orbit.frequency_hz, 1e6 * orbit.max_abs_displacement)

@@ -16,8 +16,10 @@ from nldyn.branches.continuation import continue_branch
 from nldyn.orbits.solve import solve_orbit
 from nldyn.plot.curves import _scale_and_label
 from nldyn.plot.diagram import (
+    beside_stable,
     branch_curve,
     length_unit,
+    marked_points,
     plot_diagram,
     plot_orbit,
     save_diagram,
@@ -76,7 +78,7 @@ def test_special_points_lie_on_the_drawn_curve():
 def test_diagram_names_units_and_marks():
     ax = plot_diagram(diagram(), yscale="log")
     assert ax.get_xlabel() == "excitation frequency (Hz)"
-    assert ax.get_ylabel() == "max |y| at middle (mm)"
+    assert ax.get_ylabel() == "largest displacement of middle (mm)"
     assert ax.get_yscale() == "log"
     texts = [text.get_text() for text in ax.get_legend().get_texts()]
     assert texts == [
@@ -99,14 +101,40 @@ def test_the_axis_names_the_interface_of_all_branches():
     orbits = [solve_orbit(system, frequency_hz=10.0, observe=name) for name in ("middle", "tip")]
     branches = [continue_branch(orbit, (9.0, 11.0)) for orbit in orbits]
     labels = [plot_diagram(shown).get_ylabel() for shown in (branches[1], branches)]
-    assert labels == ["max |y| at tip (µm)", "max |y| (µm)"]
+    assert labels == ["largest displacement of tip (µm)", "largest displacement (µm)"]
+
+
+def test_the_axis_names_direction_and_unit_and_the_legend_the_same_unit():
+    """Gap and natural frequency are drawn where they lie within the axes, and change no limit."""
+    stops = [Stop("tip", 1e6, gap=gap, exponent=1.0, direction=-1) for gap in (2e-6, 1.0)]
+    system = System.from_modal(
+        [13.1, 70.0], {"tip": [1.2, 0.5]}, modal_damping=0.01, stops=stops,
+        excitation=[Unbalance("tip", 1e-6)],
+    )  # fmt: skip
+    branch = continue_branch(solve_orbit(system, frequency_hz=8.0), (8.0, 14.0))
+    ax = plot_diagram(branch, direction="rotation_z")
+    assert ax.get_ylabel() == "largest rotation of tip about z (µrad)"
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert texts[-2:] == ["gap of a stop, 2 µrad", "natural, no contact:\n13.1 Hz"]
+    assert [line.get_ydata()[0] for line in ax.lines if len(set(line.get_ydata())) == 1] == [2.0]
+    bare = plot_diagram(branch, direction="rotation_z", references=False)
+    assert (ax.get_xlim(), ax.get_ylim()) == (bare.get_xlim(), bare.get_ylim())
+
+
+def test_of_many_special_points_those_beside_stable_orbits_are_marked():
+    shown = diagram().branches
+    every = marked_points(shown, ("LP", "PD", "GR"))
+    some = marked_points(shown, ("LP", "PD", "GR"), many=1)
+    assert sum(map(len, every.values())) == sum(len(b.special_points) for b in shown)
+    beside = [p for b in shown for p in b.special_points if beside_stable(b, p)]
+    assert sorted(map(id, beside)) == sorted(id(p) for ps in some.values() for p in ps)
 
 
 def test_axes_of_the_caller_are_used():
     ax = plot_diagram([resonance()], special_points=())
     assert plot_diagram([resonance()], ax, unit="µm", special_points=()) is ax
     assert len(ax.lines) == 6
-    assert ax.get_ylabel() == "max |y| at middle (µm)"
+    assert ax.get_ylabel() == "largest displacement of middle (µm)"
     with pytest.raises(ValueError, match="unit must be one of m, mm, µm, nm"):
         plot_diagram([resonance()], unit="inch")
 
@@ -130,7 +158,7 @@ def test_orbit_shows_displacement_impacts_and_force():
     system = build_system(load_scene(example("one_dof.toml")))
     orbit = solve_orbit(system, frequency_hz=25.3)
     upper, lower = plot_orbit(orbit)
-    assert upper.get_ylabel() == "displacement (µm)"
+    assert upper.get_ylabel() == "displacement of middle (µm)"
     assert upper.get_title() == "stable harmonic orbit at 25.3 Hz"
     assert lower.get_ylabel() == "contact force (N)"
     assert upper.get_legend().get_texts()[0].get_text() == "deepest contact"
