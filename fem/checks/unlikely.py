@@ -40,6 +40,8 @@ def check_masses_carried(model: FrameModel | StructureModel) -> None:
     names = [point for link in model.attached.links for point in link.points]
     for name in (*names, *(spring.point for spring in model.springs)):
         carried[mesh.node(name)] = True
+    for name in model.attached.loose:  # where nothing joins them, they are held
+        carried[mesh.nodes(name)] = True
     for lump in model.attached.point_masses:
         node = mesh.node(lump.point)
         if not carried[node]:

@@ -336,6 +336,21 @@ def without_released(rows: FloatArray, stiffness: FloatArray, released: FloatArr
     return np.asarray(found, dtype=np.float64)
 
 
+def to_neutral_axis(part: BeamPart, all_directions: bool) -> FloatArray:
+    """The matrix (12, 12) from the line of shear centres to that of centroids, in local axes.
+
+    The stiffness takes only the stretching at the centroids, since bending moves and twisting
+    turns the shear centres; the mass moves with the centroids in all directions.
+    """
+    y, z = part.neutral_axis
+    T = np.eye(12)
+    for first in (0, 6):
+        T[first, first + 4], T[first, first + 5] = z, -y
+        if all_directions:
+            T[first + 1, first + 3], T[first + 2, first + 3] = -z, y
+    return T
+
+
 def local_rows(
     part: BeamPart, spans: FloatArray, what: str
 ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
@@ -347,6 +362,8 @@ def local_rows(
     rows = np.zeros((len(spans), 8, 12))
     rows[:, :, :3], rows[:, :, 6:9] = -relative[:, :, :3], relative[:, :, :3]
     rows[:, :, 3:6], rows[:, :, 9:] = relative[:, :, 3:6], relative[:, :, 6:]
+    if any(part.neutral_axis):
+        rows = rows @ to_neutral_axis(part, all_directions=False)
     released = release(part, len(spans), what)
     if released is None:
         return rows, stiffness, None
@@ -370,6 +387,11 @@ def element_matrices(part: BeamPart, spans: FloatArray, what: str) -> tuple[Floa
     T = to_nodes(part, local_axes(part, spans, what))
     lengths = np.linalg.norm(run(part, spans, what), axis=1)
     stiffness, mass = spatial_matrices(part, lengths, what)
+    if any(part.neutral_axis):
+        stiff, heavy = (to_neutral_axis(part, every) for every in (False, True))
+        count = (len(spans), 12, 12)
+        stiffness = congruent(stiffness, np.broadcast_to(stiff, count))
+        mass = congruent(mass, np.broadcast_to(heavy, count))
     if part.released is not None:
         left = local_rows(part, spans, what)[2]
         assert left is not None

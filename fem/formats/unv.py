@@ -210,9 +210,7 @@ def _read_elements(path: Path, data: Dataset, found: Elements) -> None:
         found.properties.setdefault(of_property, []).append(label)
 
 
-def _read_groups(
-    data: Dataset, left: list[LeftOut]
-) -> Iterator[tuple[str, list[tuple[int, int]]]]:
+def _read_groups(data: Dataset, left: list[LeftOut]) -> Iterator[tuple[str, list[tuple[int, int]]]]:
     """Name of each group with the kind and label of its members; empty ones are left out."""
     i = 0
     while i < len(data.lines):

@@ -296,4 +296,4 @@ class FrameModel:
 def _is_spatial(part: BeamPart) -> bool:
     """Whether a beam has what only a structure in space has."""
     spatial = part.orientation, part.end_offsets, part.released
-    return any(part.offset) or any(value is not None for value in spatial)
+    return any((*part.offset, *part.neutral_axis)) or any(value is not None for value in spatial)

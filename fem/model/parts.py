@@ -88,6 +88,10 @@ class BeamPart:
     end_offsets
         In space: places (x, y, z) in m of both ends of the axis as seen from the nodes, in the
         axes of the whole and beside `offset`; two, or two for each line.
+    neutral_axis
+        In space: place (along the height, along the width) in m of the line of the centroids as
+        seen from that of the shear centres, about which the beam twists; `offset` and
+        `end_offsets` then are those of the shear centres.
     released
         In space: directions in which an end of the beam is not joined to its node, for each end
         numbers out of 0 to 5: along and about the axes of the section, x along the beam, y along
@@ -110,6 +114,7 @@ class BeamPart:
     offset: Sequence[float] = (0.0, 0.0)
     end_offsets: Any = None
     released: Any = None
+    neutral_axis: Sequence[float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         if not isinstance(self.material, Material):
@@ -121,6 +126,8 @@ class BeamPart:
         if not is_finite(self.axial_force):
             raise ModelError(f"part: axial_force must be finite, not {self.axial_force!r}")
         object.__setattr__(self, "offset", vector("part: offset", self.offset, 2))
+        axis = vector("part: neutral_axis", self.neutral_axis, 2)
+        object.__setattr__(self, "neutral_axis", axis)
         self._take("orientation", (3,))
         self._take("end_offsets", (2, 3))
         if self.orientation is not None and not np.any(self.orientation, axis=-1).all():

@@ -18,6 +18,7 @@ from fem.formats.nastran.deck import Deck, read_deck
 from fem.formats.nastran.gathered import Gathered
 from fem.formats.nastran.known import PARAMETERS_WITH_EFFECT
 from fem.formats.nastran.materials import Materials
+from fem.formats.nastran.matrices import read_matrices
 from fem.formats.nastran.points import read_points
 from fem.formats.nastran.rigid import mark_turning, read_rigid
 from fem.formats.nastran.rods import read_rods, twist_rods
@@ -119,6 +120,7 @@ def read_nastran(
         )
     mark_turning(gathered)
     read_points(gathered, factor)
+    read_matrices(gathered)
     read_rigid(gathered)
     twist_rods(gathered, rods)
     read_supports(gathered)

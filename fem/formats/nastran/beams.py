@@ -21,7 +21,7 @@ from fem.model.sections import LinearSection, Section
 PROPERTIES = {"CBAR": ("PBAR", "PBARL"), "CBEAM": ("PBEAM", "PBEAML", "PBCOMP")}
 DEFAULTS = {"CBAR": "BAROR", "CBEAM": "BEAMOR"}
 RIGID = 1e8  # shear area over area of a beam without shear deformation in one of two directions
-LEAST_TORSION = 1e-12  # of the polar moment: J of a beam that does not resist torsion
+LEAST = 1e-12  # of the polar moment: I1, I2 or J of a beam that resists nothing there
 LIKELY = (-0.9, 0.499)
 """Poisson's ratios that a material may have; else the section carries the shear modulus."""
 
@@ -134,15 +134,14 @@ def _part(card: Card, numbers: BeamNumbers, law: Isotropic, lines: _Lines) -> Be
         nu, factor = 0.3, G * 2.6 / E
     start, angle = _section(card, numbers, 0, factor)
     end, _ = _section(card, numbers, 1, factor)
-    density = law.density + float(
-        np.mean([n / s.area for n, s in zip(numbers.added, (start, end), strict=True)])
-    )
+    density = law.density + 2.0 * float(np.mean(numbers.added)) / (start.area + end.area)
     sheared = any(numbers.shear)
     heights, offsets = [], []
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     for span, y, w in zip(lines.spans, lines.heights, lines.offsets, strict=True):
         z = np.cross(span / np.linalg.norm(span), y)
-        heights.append(np.cos(angle) * y + np.sin(angle) * z)
-        offsets.append(w + np.array(numbers.axis) @ np.stack([y, z]))
+        heights.append(turn[0] @ np.stack([y, z]))
+        offsets.append(w)
     return BeamPart(
         Material(E, density, nu),
         start if start == end else LinearSection(start, end),
@@ -150,6 +149,7 @@ def _part(card: Card, numbers: BeamNumbers, law: Isotropic, lines: _Lines) -> Be
         orientation=_once(np.array(heights)),
         end_offsets=_once(np.array(offsets)) if np.any(offsets) else None,
         released=_pins(lines.pins),
+        neutral_axis=tuple((turn @ np.mean(numbers.axis, axis=0)).tolist()),
     )
 
 
@@ -161,14 +161,12 @@ def _section(card: Card, numbers: BeamNumbers, end: int, factor: float) -> tuple
         angle = 0.5 * np.arctan2(2.0 * mixed, first - second)
         mean, half = (first + second) / 2.0, np.hypot((first - second) / 2.0, mixed)
         first, second = mean + half, mean - half
-    torsion = torsion or LEAST_TORSION * (first + second)
+    polar = first + second
+    first, second, torsion = (value or LEAST * polar for value in (first, second, torsion))
     named = {"A": area, "I1": first, "I2": second, "J": torsion}
     wrong = [name for name, value in named.items() if not value > 0.0]
     if wrong:
-        raise card.fail(
-            f"its {' and '.join(wrong)} must be positive for a beam; give a small one, or write it"
-            " as CROD"
-        )
+        raise card.fail(f"its {' and '.join(wrong)} must be positive for a beam; write it as CROD")
     areas: list[float | None] = [None, None]
     if any(numbers.shear):
         areas = [factor * area * (k or RIGID) for k in numbers.shear]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fem.formats.nastran.cards import Card
@@ -28,7 +29,7 @@ class BeamNumbers:
     shear
         Shear factors in plane 1 and 2; 0 without shear deformation.
     axis
-        Places (y, z) of the neutral axis at both ends as seen from the line of the element.
+        Places (y, z) of the neutral axis at both ends as seen from the shear centre.
     """
 
     ends: tuple[End, End]
@@ -92,8 +93,7 @@ def _pbeaml(deck: Deck, card: Card, mass_factor: float) -> BeamNumbers:
         at += 3 + count
     last, mass = ends[-1], (mass_factor * added[0], mass_factor * added[-1])
     axis = [(-n.shear_centre[0], -n.shear_centre[1]) for n in (first, last)]
-    if any(any(place) for place in axis):
-        _tell_of_shear_centre(deck, card)
+    _tell_of_axis(deck, card, axis)
     return BeamNumbers((_end(first), _end(last)), mass, (1.0, 1.0), (axis[0], axis[1]))
 
 
@@ -116,8 +116,7 @@ def _pbeam(deck: Deck, card: Card, mass_factor: float) -> BeamNumbers:
     axis = [(card.real(8 * row + at), card.real(8 * row + at + 1)) for at in (12, 14)]
     if not (card.text(8 * row + 14) or card.text(8 * row + 15)):
         axis[1] = axis[0]
-    if any(any(place) for place in axis):
-        _tell_of_shear_centre(deck, card)
+    _tell_of_axis(deck, card, axis)
     if any(card.real(8 * row + at) for at in (8, 9, 10, 11)):
         deck.leave_out("place of NSM of PBEAM", card.place, "its mass is taken at the axis")
     last = ends[-1]
@@ -131,9 +130,10 @@ def _tell_of_stations(deck: Deck, card: Card) -> None:
     deck.leave_out(f"stations of {card.name}", card.place, reason)
 
 
-def _tell_of_shear_centre(deck: Deck, card: Card) -> None:
-    reason = "beams twist about their neutral axis"
-    deck.leave_out(f"shear centre of {card.name}", card.place, reason)
+def _tell_of_axis(deck: Deck, card: Card, axis: Sequence[tuple[float, float]]) -> None:
+    if axis[0] != axis[1]:
+        reason = "their mean is that of the whole beam"
+        deck.leave_out(f"neutral axes of {card.name} at its ends", card.place, reason)
 
 
 _READERS = {"PBAR": _pbar, "PBARL": _pbarl, "PBEAM": _pbeam, "PBEAML": _pbeaml}

@@ -113,6 +113,28 @@ def test_a_section_that_changes_linearly_stretches_and_bends_by_its_mean():
     assert shift @ M @ shift == pytest.approx(STEEL.density * 2e-3 * LENGTH)
 
 
+def test_a_beam_twists_about_its_shear_centre_and_stretches_at_its_centroid():
+    """A cantilever whose nodes lie at the shear centres: four tip loads in closed form."""
+    y, z = 0.03, 0.05
+    model = line([[0, 0, 0], [LENGTH, 0, 0]], neutral_axis=(y, z))
+    K, M = matrices(model)
+    dofs = fem.assemble(model).numbering.dofs(np.arange(2))[1]
+    flexibility = np.linalg.inv(K[np.ix_(dofs, dofs)])
+    G = E / 2.6
+    bending = LENGTH**3 / (3 * E * SECOND)
+    assert flexibility[1, 1] == pytest.approx(bending)  # along y through the shear centre
+    assert flexibility[3, 1] == pytest.approx(0.0, abs=1e-12 * flexibility[3, 3])  # no twist
+    assert flexibility[3, 3] == pytest.approx(LENGTH / (G * SECTION.torsion_constant))
+    # pulled aside of the centroid it stretches and bends by the moments of the eccentric force
+    across = y**2 * LENGTH / (E * SECOND) + z**2 * LENGTH / (E * SECTION.second_moment_across)
+    assert flexibility[0, 0] == pytest.approx(LENGTH / (E * SECTION.area) + across)
+    spin = np.zeros(12)
+    every = fem.assemble(model).numbering.dofs(np.arange(2))
+    spin[every[:, 3]] = 1.0  # both ends about the line of shear centres
+    polar = SECTION.second_moment + SECTION.second_moment_across + SECTION.area * (y**2 + z**2)
+    assert spin @ M @ spin == pytest.approx(STEEL.density * polar * LENGTH)
+
+
 def test_what_beams_have_is_kept_in_files(tmp_path):
     model = line([[0, 0, 0], [LENGTH, 0, 0]], end_offsets=np.eye(3)[:2], released=((), (5,)))
     fem.assemble(model).save(tmp_path / "arm.npz")

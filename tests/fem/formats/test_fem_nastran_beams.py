@@ -169,13 +169,21 @@ def test_pbarl_and_pbeaml_are_their_shapes(tmp_path):
     cards = cantilever("CBEAM", "PBEAML,7,1,,CHAN\n,.05,.1,.006,.008,,YES,1.,.05\n,.1,.006,.008\n")
     beam = component(tmp_path, cards).model.parts["PBEAML 7"]
     aside = SHAPES["CHAN"][1](0.05, 0.1, 0.006, 0.008).shear_centre[1]
-    np.testing.assert_allclose(beam.end_offsets, np.tile([0, 0, -aside], (2, 1)), atol=1e-15)
+    np.testing.assert_allclose(beam.neutral_axis, [0, -aside], atol=1e-15)
+    assert beam.end_offsets is None
+
+
+def test_moments_of_inertia_that_are_missing_resist_nothing(tmp_path):
+    """Without I2 and J a cantilever bends in plane 1 alone; the rest is held, as AUTOSPC does."""
+    found = component(tmp_path, cantilever("CBAR", "PBAR,7,1,1.-4,2.-9\n"))
+    expected = CLAMPED**2 / (2 * np.pi) * np.sqrt(2e11 * 2e-9 / 0.8)
+    np.testing.assert_allclose(lowest(found, 1), expected, rtol=1e-4)
 
 
 @pytest.mark.parametrize(
     ("prop", "said"),
     [
-        ("PBAR,7,1,1.-4,,1.-9,1.-9\n", "PBAR: its I1 must be positive for a beam"),
+        ("PBAR,7,1,1.-4\n", "PBAR: its I1 and I2 and J must be positive for a beam"),
         ("PBARL,7,1,,HAT\n,.1,.1,.1,.1\n", "PBARL: the shape 'HAT' is not read"),
         ("PBAR,8,1,1.-4,1.-9,1.-9,1.-9\n", "PBAR 7 of CBAR in line .* is not defined"),
     ],

@@ -214,3 +214,32 @@ def test_the_analysis_set_is_a_set_of_points(tmp_path):
 def test_supports_alone_do_not_forbid_another_unit(tmp_path):
     mesh = read(tmp_path, "SPC1,1,123,1,2\n")
     assert mesh.attachments and not mesh.attachments.measured
+
+
+PUNCHED = """DMIG    KSPR           0       6       2       0               2
+DMIG*   KSPR                          20               1
+*                     20               1 8.000000000D+00
+DMIG*   KSPR                          20               2
+*                     20               1-2.000000000D+00
+*                     20               2 5.000000000D+00
+"""
+
+
+def test_matrices_that_case_control_names_are_added(tmp_path):
+    """A punched stiffness, and a mass in free fields; unnamed ones are told."""
+    (tmp_path / "k.pch").write_text(PUNCHED)
+    cards = (
+        "GRID,20,,5.,5.,5.\nINCLUDE 'k.pch'\nDMIG,MASS,0,1,1\nDMIG,MASS,20,1,,20,1,2.\n"
+        "DMIG,MASS,20,2,,20,2,2.\nDMIG,OTHER,0,6,1\nDMIG,OTHER,20,1,,20,1,9.\n"
+    )
+    mesh = read(tmp_path, cards + HELD, "SPC = 1\nK2GG = KSPR\nM2GG = MASS")
+    expected = np.linalg.eigvalsh([[8.0, -2.0], [-2.0, 5.0]]) / 2.0
+    np.testing.assert_allclose((2 * np.pi * hz(assembled(mesh))) ** 2, expected, rtol=1e-9)
+    assert any(item.keyword == "DMIG OTHER" for item in mesh.left_out)
+    with pytest.raises(fem.ModelError, match="K2GG = NONE: there is no DMIG 'NONE'"):
+        read(tmp_path, cards, "K2GG = NONE")
+    bad = "DMIG,MASS,0,1,1\nDMIG,MASS,1,1,,2,1,2.\n"
+    with pytest.raises(fem.ModelError, match="DMIG: MASS is not symmetric"):
+        read(tmp_path, bad, "M2GG = MASS")
+    with pytest.raises(fem.ModelError, match="DMIG: must be symmetric"):
+        read(tmp_path, "DMIG,MASS,0,2,1\n", "M2GG = MASS")

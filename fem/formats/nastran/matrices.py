@@ -1,0 +1,102 @@
+"""Matrices that a deck gives by DMIG, which case control adds to stiffness, mass or damping."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fem.base.errors import ModelError
+from fem.formats.nastran.cards import Card
+from fem.formats.nastran.gathered import Gathered
+
+CHOICES = {"K2GG": "stiffness", "M2GG": "mass", "B2GG": "damping"}
+IN_RESPONSES = ("K2PP", "M2PP", "B2PP")
+SYMMETRIC, SQUARE = 6, 1
+MOST = 3000
+"""Rows of a matrix that is kept whole."""
+Entry = tuple[int, int]
+
+
+@dataclass
+class _Matrix:
+    """A matrix: the card that begins it, and its values by row and column."""
+
+    card: Card
+    values: dict[tuple[Entry, Entry], float] = field(default_factory=dict)
+
+
+def read_matrices(gathered: Gathered) -> None:
+    """Read the matrices that K2GG, M2GG and B2GG name; the others are told."""
+    deck = gathered.deck
+    found = _all(deck.of("DMIG"))
+    used = set()
+    for choice, kind in CHOICES.items():
+        value = deck.control.first(choice)
+        if not value:
+            continue
+        for name in re.split(r"\s*[,+]\s*|\s+", value):
+            if name not in found:
+                raise ModelError(f"{deck.source}: {choice} = {value}: there is no DMIG {name!r}")
+            used.add(name)
+            _add(gathered, kind, name, found[name])
+    for choice in IN_RESPONSES:
+        if deck.control.first(choice):
+            name = deck.control.first(choice)
+            used.add(name)
+            place = found[name].card.place if name in found else "case control"
+            deck.leave_out(choice, place, "it acts in responses only, not in modes")
+    for name, matrix in found.items():
+        if name not in used:
+            reason = "no K2GG, M2GG or B2GG of case control names it"
+            deck.leave_out(f"DMIG {name}", matrix.card.place, reason)
+
+
+def _all(cards: list[Card]) -> dict[str, _Matrix]:
+    found: dict[str, _Matrix] = {}
+    for card in cards:
+        name = card.text(0)
+        if card.text(1) == "0":
+            found[name] = _begun(card)
+        elif name not in found:
+            raise card.fail(f"the matrix {name} is not begun (DMIG,{name},0,...)")
+        else:
+            _column(card, found[name])
+    return found
+
+
+def _begun(card: Card) -> _Matrix:
+    form, kind = card.whole(2), card.whole(3)
+    if form not in (SYMMETRIC, SQUARE) or kind not in (1, 2):
+        raise card.fail("must be symmetric (6) or square (1) and real (1 or 2)")
+    return _Matrix(card)
+
+
+def _column(card: Card, matrix: _Matrix) -> None:
+    column = card.whole(1), card.whole(2, 0)
+    for at in range(4, len(card.fields), 4):
+        if card.text(at):
+            row = card.whole(at), card.whole(at + 1, 0)
+            matrix.values[row, column] = card.real(at + 2)
+            if matrix.card.whole(2) == SYMMETRIC:
+                matrix.values[column, row] = card.real(at + 2)
+
+
+def _add(gathered: Gathered, kind: str, name: str, matrix: _Matrix) -> None:
+    entries = sorted({entry for pair in matrix.values for entry in pair})
+    if len(entries) > MOST:
+        raise matrix.card.fail(
+            f"{name} has {len(entries)} rows, more than {MOST}; give it as [matrices] in the scene"
+        )
+    at = {entry: i for i, entry in enumerate(entries)}
+    full = np.zeros((len(entries), len(entries)))
+    for (row, column), value in matrix.values.items():
+        full[at[row], at[column]] = value
+    if not np.allclose(full, full.T, rtol=1e-9, atol=1e-9 * np.abs(full).max(initial=0.0)):
+        raise matrix.card.fail(f"{name} is not symmetric")
+    for grid, component in entries:
+        if component > 3 and kind != "mass":
+            gathered.turns.add(grid)
+    rows = [gathered.terms(matrix.card, grid, max(component, 1)) for grid, component in entries]
+    gathered.add_matrix(matrix.card, rows, **{kind: full})
