@@ -24,6 +24,10 @@ NOTES = {
         "times as long that is as the flow map takes. Empty: the error is not reached."
     ),
     "Work and precision": "Every measured point. Errors are relative, in the energy norm.",
+    "Modes of a solid": (
+        "Ten modes of a bracket of tetrahedra of second order, clamped at one face, each row in a "
+        "process of its own; `python -m bench.solids` measures it alone."
+    ),
     "Number of modes": (
         "The same beam with more modes, one impact per period at 38 Hz, default options. Errors "
         "against the tightest options."

@@ -15,6 +15,7 @@ from bench.figures import draw_model
 from bench.measure import Sample, measure_engine, setting_label
 from bench.models import MODELS, load_flip
 from bench.page import Row, write_page
+from bench.solids import solid_times
 from bench.studies import BranchTime
 from bench.targets import (
     all_targets,
@@ -24,6 +25,7 @@ from bench.targets import (
     ratio_rows,
     resonance_target,
     search_targets,
+    solid_targets,
     throughput_targets,
 )
 from nldyn.flow.options import FlowOptions
@@ -69,6 +71,8 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
     tell("impacts with many modes, searches in vain")
     impacts = studies.impact_times()
     searches = studies.vain_searches()
+    tell("modes of a solid")
+    solids = solid_times()
     tell("sample of the atlas")
     atlas = studies.atlas_times()
     tell("plain simulation, threads")
@@ -85,6 +89,7 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
         impact_target(impacts),
         *search_targets(searches),
         atlas_target(atlas),
+        *solid_targets(*solids),
     ]
     rivals = [e.name for e in ENGINES if e.has_monodromy]
     tables: dict[str, Sequence[Row]] = {
@@ -121,6 +126,17 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
                 "min for all": f"{a.minutes:.0f}",
             }
             for a in atlas
+        ],
+        "Modes of a solid": [
+            {
+                "degrees of freedom": str(s.size),
+                "what": s.what,
+                "processor, s": f"{s.seconds:.0f}",
+                "peak memory, GB": f"{s.gigabytes:.2f}",
+                "lowest, Hz": f"{s.frequencies_hz[0]:.6g}",
+                "highest, Hz": f"{s.frequencies_hz[-1]:.6g}",
+            }
+            for s in solids
         ],
         "Branches": [*map(branch_row, branches), *auto_times()],
         "Special points": special_point_rows(branches[0]),

@@ -10,6 +10,7 @@ from bench import throughput
 from bench.engines import NLDYN
 from bench.measure import Sample, curve
 from bench.ratios import seconds_at, times_faster
+from bench.solids import MODES, SolidTime
 from bench.studies import (
     AtlasTime,
     BranchTime,
@@ -299,3 +300,19 @@ def ratio_rows(
                 row[f"times nldyn at {error:.0e}"] = "" if ratio is None else f"{ratio:.3g}"
             rows.append(row)
     return rows
+
+
+def solid_targets(ours: SolidTime, peer: SolidTime) -> list[Target]:
+    """Time and memory of the modes of a solid from its mesh, against a peer from the matrices."""
+    what = f"{MODES} modes of a solid of {ours.size} degrees of freedom, from the mesh"
+    times = ours.seconds / peer.seconds
+    memory = ours.gigabytes / peer.gigabytes
+    return [
+        target(
+            f"{what}, against those {peer.what}",
+            "at most 1.25 times its time of the processor",
+            f"{times:.2f} times",
+            times <= 1.25,
+        ),
+        target(f"{what}: memory", "no more than the other", f"{memory:.2f} times", memory <= 1.0),
+    ]
