@@ -11,7 +11,9 @@ from typing import TypeVar
 from fem.base.errors import ModelError
 from fem.formats.abaqus.keywords import decoded
 
-REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[ED]?([+-]\d+)|[ED](\d+))?", re.IGNORECASE)
+REAL = re.compile(
+    r"([+-]?(?:\d+\.?\d*|\.\d+))(?: *[ED]? *([+-] *\d+)| *[ED] *(\d+))?", re.IGNORECASE
+)
 WHOLE = re.compile(r"[+-]?\d+")
 MOST_INCLUDED = 200  # files, each counted as often as it is included
 EQUATION = "DEQATN"
@@ -84,7 +86,8 @@ class Card:
         found = REAL.fullmatch(word)
         if found is None:
             raise self.fail(f"{word!r} in field {at + 2} is not a real number")
-        return float(f"{found[1]}e{found[2] or found[3] or 0}")
+        exponent = (found[2] or found[3] or "0").replace(" ", "")
+        return float(f"{found[1]}e{exponent}")
 
     def reals(self, first: int, count: int) -> list[float]:
         """Several real numbers; blank ones are 0."""

@@ -1,5 +1,8 @@
 """Cards and fields of Nastran, and its solids; what is not read is refused by card."""
 
+import re
+from pathlib import Path
+
 import meshio
 import numpy as np
 import pytest
@@ -7,6 +10,7 @@ from mixed import mixed_block
 from structures import STEEL, lowest_hz
 
 import fem
+from fem.formats.nastran.known import ADVICE, LEFT_OUT, READ
 
 CARDS = {"tetra": "CTETRA", "pyramid": "CPYRAM", "wedge": "CPENTA", "hexahedron": "CHEXA"}
 WEDGE15 = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14, 9, 10, 11)
@@ -157,3 +161,16 @@ def test_meshio_writes_the_same_solids(tmp_path, family, form):
     assert set(found.cells) == set(cells)
     for kind, nodes in cells.items():
         np.testing.assert_allclose(found.points[found.cells[kind]], mesh.points[nodes], atol=1e-6)
+
+
+def test_the_page_lists_every_card():
+    """docs/reference/nastran.md and `known.py` say the same of every card."""
+    page = (Path(__file__).parents[3] / "docs" / "reference" / "nastran.md").read_text("utf-8")
+    read, left = page.split("## All cards")[1].split("**Left out by intention:**")
+    assert set(re.findall(r"`(.+?)`", read)) == READ
+    left, refused = left.split("**Refused with advice**")
+    for text, known in ((left, LEFT_OUT), (refused, ADVICE)):
+        rows = re.findall(r"^\| (.+?) \| (`.+`) \|$", text, flags=re.MULTILINE)
+        found = {card: why for why, cards in rows for card in re.findall(r"`(.+?)`", cards)}
+        assert found == known
+    assert not READ & set(LEFT_OUT) and not READ & set(ADVICE) and not set(LEFT_OUT) & set(ADVICE)

@@ -125,3 +125,50 @@ def test_a_part_that_the_deck_describes_otherwise_is_told(folder, old, new, said
     told = CliRunner().invoke(main, ["check", str(folder / "given.toml")]).stdout
     assert re.search(said, told)
     assert ("as in the scene" in told) == bool(said)
+
+
+NASTRAN = """SOL 103
+CEND
+SPC = 1
+BEGIN BULK
+{grids}{bars}PBARL,7,1,,BAR
+,.02,.01
+MAT1,1,2.1+11,,.3,7800.
+SPC1,1,123456,1
+CONM2,90,11,,40.
+CDAMP2,91,30.,11,2
+CELAS2,92,1000.,11,2
+ENDDATA
+""".format(
+    grids="".join(f"GRID,{i + 1},,{i / 10!r},0.,0.\n" for i in range(11)),
+    bars="".join(f"CBAR,{i},7,{i},{i + 1},0.,1.,0.\n" for i in range(1, 11)),
+)
+OF_NASTRAN = """
+interfaces.tip = {at = "node 11", direction = "y"}
+reduction = {modes = 2}
+excitation = [{at = "tip", kind = "harmonic", amplitude = 1.0}]
+continuation = {range_hz = [0.5, 2.0]}
+"""
+
+
+@pytest.mark.parametrize("named", ['"all"', '["PBARL 7"]'])
+def test_a_deck_of_nastran_is_a_system_without_retyping(tmp_path, named):
+    """The same oscillator, with a spring at its tip: supports, sections and masses of the deck."""
+    (tmp_path / "deck.bdf").write_text(NASTRAN)
+    mesh = f'mesh = {{file = "deck.bdf", model = "structure", parts_from_file = {named}}}\n'
+    (tmp_path / "nastran.toml").write_text(OF_NASTRAN + mesh)
+    system = build_system(load_scene(tmp_path / "nastran.toml"))
+    mass = 40.0 + 33 / 140 * 7800.0 * 0.02 * 0.01
+    stiffness = 3 * 2.1e11 * 0.02 * 0.01**3 / 12 + 1000.0
+    omega = 2 * math.pi * system.frequencies_hz[0]
+    assert omega == pytest.approx(math.sqrt(stiffness / mass), rel=1e-3)
+
+
+def test_a_part_of_nastran_that_the_scene_gives_otherwise_is_told(tmp_path):
+    (tmp_path / "deck.bdf").write_text(NASTRAN)
+    mesh = 'mesh = {file = "deck.bdf", model = "structure"}\n'
+    part = f"[parts.'PBARL 7']\n{PART}height = 0.01\norientation = [0.0, 1.0, 0.0]\n"
+    part = part.replace("density = 7800.0", "density = 2700.0")
+    (tmp_path / "nastran.toml").write_text(OF_NASTRAN + mesh + part)
+    notes = build_component(load_scene(tmp_path / "nastran.toml")).model.mesh.notes
+    assert any("'PBARL 7' is as in the scene, not as in the file: density 2700" in n for n in notes)

@@ -13,7 +13,7 @@ from nldyn.scene.read import parse_scene
         ("[[stops]\n", "in '[[stops]' ']]' is likely missing"),
         ("[modal]\nf = [1.0,\n  2.0\n[damping]", "in 'f = [1.0,' ']' is likely missing at the end"),
         ("[modal]\nf = [1.0 2.0]", "in 'f = [1.0 2.0]' ']' is likely missing at the end of the li"),
-        ("[[stops]]\nat = tip # here", 'in \'at = tip # here\' quotes are likely missing: "tip"'),
+        ("[[stops]]\nat = tip # here", "in 'at = tip # here' quotes are likely missing: \"tip\""),
         ("[[stops]]\nat =\n", "in 'at =' the value is missing"),
         ('title = "foo\n', "in 'title = \"foo' a quotation mark is likely missing"),
         ("x [1.0]", "in 'x [1.0]' '=' is likely missing"),
