@@ -69,6 +69,8 @@ class Elements:
         Labels of the nodes, in VTK's order.
     properties
         Labels of the elements of each number of a physical property.
+    first
+        The first line of the elements.
     beams
         The lines of the beams, which say how these are turned and which sections they have.
     unread
