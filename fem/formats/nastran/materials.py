@@ -13,6 +13,8 @@ from fem.formats.nastran.deck import Deck
 
 SAME = 1e-3  # relative: moduli that are those of one isotropic material
 EXPANSION = "thermal expansion is not used: stiffness and mass are those of the cold structure"
+DAMPINGS = {"MAT1": 7, "MAT2": 12, "MAT8": 16, "MAT9": 30}
+"""Where the coefficient of structural damping (GE) stands."""
 EXPANSIONS = {"MAT1": (5,), "MAT2": (8, 9, 10), "MAT8": (8, 9), "MAT9": tuple(range(23, 29))}
 
 
@@ -79,7 +81,7 @@ class Materials:
         return self._isotropic(own)
 
     def _isotropic(self, card: Card) -> Isotropic:
-        self._tell_of_expansion(card)
+        self._tell_of_unused(card)
         E, G, nu = (card.real(at) if card.text(at) else None for at in (1, 2, 3))
         if E is None and G is None:
             raise card.fail("has neither E nor G")
@@ -99,7 +101,7 @@ class Materials:
         own = self._card(number, card)
         if own.name == "MAT1":
             return self._isotropic(own)
-        self._tell_of_expansion(own)
+        self._tell_of_unused(own)
         if own.name == "MAT2":
             g11, g12, g13, g22, g23, g33 = own.reals(1, 6)
             law = np.array([[g11, g12, g13], [g12, g22, g23], [g13, g23, g33]])
@@ -124,7 +126,7 @@ class Materials:
         own = self._card(number, card)
         if own.name != "MAT9":
             return self.isotropic(number, card)
-        self._tell_of_expansion(own)
+        self._tell_of_unused(own)
         law = np.zeros((6, 6))
         law[np.triu_indices(6)] = own.reals(1, 21)
         law = law + law.T - np.diag(np.diag(law))
@@ -135,7 +137,11 @@ class Materials:
             raise card.fail(f"names the material {number}, which is not defined")
         return self.cards[number]
 
-    def _tell_of_expansion(self, card: Card) -> None:
+    def _tell_of_unused(self, card: Card) -> None:
+        if card.text(DAMPINGS[card.name]) and card.real(DAMPINGS[card.name]):
+            reason = "damping of materials is given by the scene"
+            if "GE of materials" not in self.deck.left:
+                self.deck.leave_out("GE of materials", card.place, reason)
         if any(card.text(at) and card.real(at) for at in EXPANSIONS[card.name]):
             what = f"thermal expansion of {card.name} {card.whole(0)}"
             if what not in self.deck.left:

@@ -230,7 +230,7 @@ def _bush_axes(gathered: Gathered, card: Card, places: list[FloatArray]) -> Floa
         return systems.system(card.whole(7), card).axes_at(places[0])
     length = np.linalg.norm(places[-1] - places[0])
     if length == 0.0:
-        return np.eye(3)
+        raise card.fail("has no length, so it needs a coordinate system (CID) for its directions")
     x = (places[-1] - places[0]) / length
     if card.text(4) and not card.is_real(4):
         v = gathered.deck.place(card.whole(4), card) - places[0]

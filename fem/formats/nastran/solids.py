@@ -40,6 +40,9 @@ def read_solids(gathered: Gathered, materials: Materials) -> None:
     for card in properties.values():
         if card.text(6) not in MECHANICAL:
             raise card.fail(f"is of a fluid or another field ({card.text(6)}), no solid")
+        if card.text(3) or card.text(5):
+            reason = "solids are integrated as their parts say"
+            gathered.deck.leave_out("integration of PSOLID", card.place, reason)
     for owner, card in used.items():
         gathered.described[f"PSOLID {owner}"] = _described(owner, card, properties, materials)
 

@@ -77,6 +77,7 @@ def test_coordinate_systems_stand_in_chains(tmp_path):
         ("CONM2,9,77,,1.\n", "CONM2: names the grid point 77, which is not defined"),
         ("CELAS1,9,5,1,1\n", "CELAS1: names the property 5, which is not defined"),
         ("CBUSH,9,5,1,2\n", "CBUSH: names the property PBUSH 5, which is not defined"),
+        ("PBUSH,5,K,1.\nCBUSH,9,5,1\n", r"CBUSH: has no length, so it needs a .* \(CID\)"),
         ("SPC1,1,7,1\n", "SPC1: '7' in field 4 are not directions out of 1 to 6|'7' in field 3"),
         ("RBE3,9,,1,123456,1.,123,2,3\n", "RBE3: its grid points do not determine all six"),
         ("RBAR,9,1,2,123,123456\n", "RBAR: its independent directions .* are not six"),

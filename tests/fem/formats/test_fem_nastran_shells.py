@@ -112,10 +112,11 @@ def test_elements_with_own_thickness_offset_and_direction_are_parts_of_their_own
 
 
 def test_what_is_not_used_is_told(tmp_path):
-    cards = QUAD + "PSHELL,3,2,.01,2,,2\nMAT1,2,2.+11,,.3,8000.,1.2-5\nTEMPD,1,20.\n"
+    cards = QUAD + "PSHELL,3,2,.01,2,,2\nMAT1,2,2.+11,,.3,8000.,1.2-5,,.02\nTEMPD,1,20.\n"
     told = [str(item) for item in read(tmp_path, cards).left_out]
     assert "thermal expansion of MAT1 2" in " ".join(told)
     assert any(text.startswith("TEMPD (1") for text in told)
+    assert any(text.startswith("GE of materials (1") for text in told)
 
 
 @pytest.mark.parametrize(
