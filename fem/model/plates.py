@@ -65,6 +65,7 @@ class PlateSection:
             value = getattr(self, name)
             if not (is_finite(value) and value >= 0.0):
                 raise ModelError(f"plate section: {name} must not be negative, not {value!r}")
+            object.__setattr__(self, name, float(value))
         energies = {"membrane, coupling and bending": self.law, "shear": np.array(self.shear)}
         for name, matrix in energies.items():
             scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
