@@ -67,7 +67,7 @@ from fem.model.structure import AXES, StructureModel
 
 
 class LockingWarning(UserWarning):
-    """First-order solids on a part that is thin: they are too stiff in bending."""
+    """Solids that are likely to be too stiff in bending on this mesh, and by how much."""
 
 
 class DistortionWarning(UserWarning):
@@ -175,7 +175,7 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     Warns
     -----
     LockingWarning
-        If a part of first-order cells is so thin that it is much too stiff in bending.
+        If cells of a part are likely to be more than 5 % too stiff in bending.
     DistortionWarning
         If cells are out of shape.
     UnlikelyWarning

@@ -120,7 +120,8 @@ def body(kind, counts, place, thickness, modulus, poisson, supports):
         for name, directions in supports.items()
     ]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)
+        warnings.simplefilter("ignore", fem.DistortionWarning)
+        warnings.simplefilter("ignore", fem.UnlikelyWarning)
         model = fem.StructureModel(mesh.with_points(points), {"body": part}, supports=held)
         component = fem.assemble(model)
     more = len(model.mesh.points) - len(at)  # middles of quad8, where nothing is looked for

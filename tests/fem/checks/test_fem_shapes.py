@@ -10,7 +10,6 @@ from structures import STEEL
 import fem
 from fem.checks.conforming import check_conforming
 from fem.checks.distorted import aspects, distortion_warnings, least_volumes, warps
-from fem.checks.locking import thickness
 from fem.mesh.cells import KINDS
 
 
@@ -120,12 +119,6 @@ def test_assembling_warns_of_cells_out_of_shape_and_not_of_good_ones():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         fem.assemble(model_of(fem.box_mesh("bar", (4.0, 1.0, 1.0), (4, 1, 1))))
-
-
-def test_the_thickness_of_a_part_is_that_of_all_its_cells():
-    """Faces between cells of different kinds are inside: twice volume over surface."""
-    mesh = mixed_block("first order")
-    assert thickness(mesh.points, mesh.cells) == pytest.approx(2.0 * 8.0 / 24.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["quad9", "pyramid14", "wedge18", "hexahedron27"])

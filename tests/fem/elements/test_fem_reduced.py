@@ -34,6 +34,36 @@ def test_a_thin_ring_in_one_row_of_cells_bends_as_ring_theory_says(thickness, co
     np.testing.assert_allclose(found[6:], wanted / (2 * np.pi), rtol=0.015)
 
 
+@pytest.mark.parametrize(("thickness", "count"), [(0.05, 16), (0.02, 24), (0.01, 24)])
+def test_the_warning_says_how_much_too_stiff_a_ring_in_full_is(thickness, count):
+    """The square of the ratio of frequencies, at most a tenth more than what is said."""
+    wanted = np.sqrt(36 / 5 * STEEL.youngs_modulus * thickness**2 / (12 * STEEL.density))
+    with pytest.warns(fem.LockingWarning, match="times too stiff: they are curved by") as caught:
+        component = assembled(ring(thickness, count), integration="full")
+    said = float(str(caught[0].message).split("about ")[1].split(" times")[0])
+    found = (lowest_hz(component, 8)[6] * 2 * np.pi / wanted) ** 2
+    assert found == pytest.approx(said, rel=0.1)
+
+
+def test_a_ring_of_short_cells_in_full_is_not_warned_of():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assembled(ring(0.05, 48), integration="full")
+
+
+@pytest.mark.parametrize("holes", [8, 16])
+def test_a_hole_in_a_wide_plate_is_not_taken_for_a_thin_part(holes):
+    """The wall of a hole is curved, but what lies behind it is not thin."""
+    mesh = fem.box_mesh("plate", (1.0, 1.0, 0.1), (holes, 3, 1), kind="hexahedron27")
+    a, b, z = mesh.points.T
+    turn, radius = 2 * np.pi * a, 0.1 * 10.0**b
+    points = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), z])
+    plate = fem.joined([mesh.with_points(points)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", fem.LockingWarning)
+        fem.assemble(fem.StructureModel(plate, {"plate": fem.SolidPart(STEEL)}))
+
+
 @pytest.mark.parametrize(
     ("types", "same"),
     [("C3D20R", "reduced"), ("C3D20", "full"), (None, "reduced"), ("CHEXA", "reduced")],
