@@ -73,7 +73,8 @@ class Sides:
         ends = self.places[:, np.array(self.kind.edges)]
         first = len(self.kind.corners)
         middles = self.places[:, first : first + len(self.kind.edges)]
-        return np.abs(np.einsum("fri,fi->fr", middles - ends.mean(axis=2), self.normals))
+        offs = np.einsum("fri,fi->fr", middles - ends.mean(axis=2), self.normals)
+        return np.asarray(np.abs(offs), dtype=np.float64)
 
     @property
     def warps(self) -> FloatArray:
@@ -84,7 +85,7 @@ class Sides:
             "fki,k,fi->f", self.places[:, :4], (0.25, -0.25, 0.25, -0.25), self.normals
         )
         slender = self.lengths.max(axis=1) / self.lengths.min(axis=1)
-        return np.abs(heights) * slender
+        return np.asarray(np.abs(heights) * slender, dtype=np.float64)
 
 
 def locking_warnings(model: StructureModel) -> Iterator[str]:
