@@ -10,7 +10,9 @@ from nldyn.bifurcations.normal_forms import NormalForm
 from nldyn.branches.endings import StopReason
 from nldyn.orbits.multipliers import Stability
 from nldyn.report import results
+from nldyn.system.parameters import Parameter
 
+FREQUENCY = Parameter("frequency_hz")
 SURE = Stability(0.5 + 0.2j, -0.62, 1e-7)
 
 
@@ -41,6 +43,11 @@ class FakeOrbit:
 class FakeNode:
     orbit: FakeOrbit
     arclength: float
+    parameter: Parameter = FREQUENCY
+
+    @property
+    def value(self):
+        return self.orbit.frequency_hz
 
 
 @dataclass(frozen=True)
@@ -55,6 +62,10 @@ class FakeSpecialPoint:
     @property
     def frequency_hz(self):
         return self.point.orbit.frequency_hz
+
+    @property
+    def value(self):
+        return self.point.value
 
     @property
     def form(self):
@@ -76,6 +87,10 @@ class FakeBranch:
     @property
     def points(self):
         return [node.orbit for node in self.nodes]
+
+    @property
+    def parameter(self):
+        return Parameter("frequency_hz")
 
     @property
     def frequency_hz(self):

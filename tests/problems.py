@@ -6,9 +6,16 @@ from scipy import sparse
 
 import cms
 from nldyn import Damper, HarmonicForce, LoadCase, Stop, System, Unbalance
+from nldyn.orbits.bordered import OrbitFamily, Solved
+from nldyn.orbits.orbit import Orbit
 
 RANGE_HZ = (5.7, 90.0)
 THREE_HZ = (36.0, 38.5)  # where there are branches of three periods up to 3
+
+
+def in_frequency(orbit: Orbit) -> Solved:
+    """An orbit as one of a family in the frequency."""
+    return OrbitFamily.in_frequency(orbit).place(orbit)
 
 
 def make_one_dof(**changes) -> System:

@@ -8,7 +8,6 @@ be one with each mixture of impacts and misses.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -21,10 +20,10 @@ from nldyn.bifurcations.rigid_grazing import MOST_TOUCHES, Beside, RootMap, turn
 from nldyn.bifurcations.rigid_touch import Touches
 from nldyn.bifurcations.sign_changes import accounted
 from nldyn.bifurcations.touching import rigid_touches
-from nldyn.orbits.bordered import Corrected, Free, OrbitFamily, correct, length_unit
+from nldyn.orbits.bordered import FREE, Corrected, OrbitFamily, correct, length_unit
 from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit, minimal_period
-from nldyn.orbits.shooting import BROKEN, FROM_NEAR, ShootingProblem, asymmetry, metric_length
+from nldyn.orbits.shooting import BROKEN, FROM_NEAR, asymmetry, metric_length
 
 SLIGHT = 1e-5, 1e-4, 1e-3  # first impacts and misses looked for, depth over the orbit's size
 SLIGHTER = 1e-6, 1e-7  # misses, where the motion at the touch hardly changes with the frequency
@@ -55,11 +54,10 @@ def beyond_rigid_grazing(at: BranchNode, before: Orbit) -> BranchNode | None:
     BranchNode or None
         Heading away from the grazing; None if there is no such orbit, or more than one.
     """
-    exact = at.orbit
-    found = orbit_beyond(exact, before, OrbitFamily.in_frequency(exact))
+    found = orbit_beyond(at.orbit, before, at.family)
     if found is None:
         return None
-    beyond = _as_node(exact, found)
+    beyond = _as_node(at, found)
     return replace(beyond, arclength=at.arclength + beyond.arclength)
 
 
@@ -99,11 +97,11 @@ def switch_at_rigid_grazing(special: SpecialPoint, times: int = 1) -> list[Branc
     LocateError
         If no such orbits begin there, or none is found.
     """
-    exact, hz = special.orbit, f"{special.frequency_hz:.6g} Hz"
+    exact, hz = special.orbit, special.place()
     if not Grazing.of(exact).half:
         raise SystemModelError(f"no branch leaves the grazing at {hz}, which is of an elastic stop")
     try:
-        touches = Touches.of(exact, times)
+        touches = Touches.of(exact, times, family=special.point.family)
         form = RootMap.of(touches)
         kinds = form.beside if times == 1 else form.with_one_hit(len(touches.stops) // times)
         found = [
@@ -118,7 +116,7 @@ def switch_at_rigid_grazing(special: SpecialPoint, times: int = 1) -> list[Branc
         if len(touches.stops) > MOST_TOUCHES:
             raise LocateError(f"too many touches graze at {hz} to tell which orbits begin there")
         raise LocateError(f"no orbit of period {period} with an impact begins at {hz}")
-    nodes = [_as_node(exact, orbit) for orbit in found if orbit is not None]
+    nodes = [_as_node(special.point, orbit) for orbit in found if orbit is not None]
     if not nodes:
         raise LocateError(
             f"no orbit of period {period} is found beside the grazing at {hz}, though one begins "
@@ -155,19 +153,15 @@ def first_beside(
     return next((orbit for orbit in found if orbit is not None), None)
 
 
-def _as_node(exact: Orbit, found: Corrected) -> BranchNode:
+def _as_node(at: BranchNode, found: Corrected) -> BranchNode:
     """An orbit beside a grazing as a point of a branch heading away, with its distance."""
-    orbit, base = found.orbit, exact.problem
-    times = orbit.period // exact.period
-    problem = (
-        base if times == 1 else ShootingProblem(base.flow, orbit.period, times * base.segments)
-    )
-    orbit = replace(orbit, problem=problem)
-    grazing = np.append(np.tile(exact.point[:-1], times), exact.point[-1])
-    weights = problem.metric(grazing)
-    way, along = orbit.point - grazing, found.along
-    tangent = math.copysign(1.0, along @ (weights * way)) / metric_length(weights, along) * along
-    return BranchNode(orbit, tangent, metric_length(weights, way))
+    times = found.orbit.period // at.orbit.period
+    family = at.family.repeated(times)
+    grazing = np.append(np.tile(at.point[:-1], times), at.point[-1])
+    way = found.point - grazing
+    length = metric_length(family.metric(grazing), way)
+    tangent = found.tangent(way)
+    return BranchNode(family, found.point, found.orbit, tangent, length)
 
 
 def _ahead(touches: Touches, exact: Orbit, before: Orbit) -> Beside | None:
@@ -253,8 +247,7 @@ def _beside(exact: Orbit, touches: Touches, beside: Beside, share: float) -> Cor
     held = np.zeros(grazing.size)
     held[-1] = 1.0
     found = correct(
-        family, places[1], Free(), held, float(places[1][-1]), max_iterations=FROM_NEAR,
-        first_step=AS_ASKED * way,
+        family, places[1], FREE, held, max_iterations=FROM_NEAR, longest=AS_ASKED * way,
     )  # fmt: skip
     if not found.converged:
         return None

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from nldyn.bifurcations.point import SpecialPoint
+from nldyn.orbits.bordered import Place, Solved
 from nldyn.orbits.conditions import nearest_crossing
-from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length
 
 CROSSES = 1e-12  # least unfolding of a crossing, relative to the orbit, that is not rounding
@@ -20,44 +20,44 @@ SHORTEST_CROSSING = 3e-6  # step over which a branch may cross another one
 SAME = 2.0 * SHORTEST_CROSSING  # distance of branch points that two such steps locate as one
 
 
-def is_crossing(orbit: Orbit) -> bool:
+def is_crossing(place: Place) -> bool:
     """Whether branches cross beside an orbit, and do not only come close; if it can be told."""
-    crossing = nearest_crossing(orbit)
+    crossing = nearest_crossing(place)
     return crossing is None or crossing[1] <= CROSSES
 
 
-def lies_on_crossing(orbit: Orbit, within: float) -> bool:
+def lies_on_crossing(place: Place, within: float) -> bool:
     """Whether branches cross within a distance of an orbit, relative to it.
 
     On a plane across a branch Newton's method may find any orbit of the other one there.
     """
-    return crossing_within(orbit, within) is not None
+    return crossing_within(place, within) is not None
 
 
-def crossing_within(orbit: Orbit, within: float) -> Orbit | None:
+def crossing_within(place: Place, within: float) -> Solved | None:
     """Where branches cross within a distance of an orbit, relative to it, if they do."""
-    crossing = crossing_beside(orbit, FIRST_STEP * within)
-    return crossing if crossing is not None and distance(orbit, crossing) < within else None
+    crossing = crossing_beside(place, FIRST_STEP * within)
+    return crossing if crossing is not None and distance(place, crossing) < within else None
 
 
-def crossing_beside(orbit: Orbit, first_step: float = math.inf) -> Orbit | None:
+def crossing_beside(place: Place, longest: float = math.inf) -> Solved | None:
     """Where branches cross beside an orbit that has a multiplier near 1, if they do.
 
     It is given up where the first step towards it is longer than said.
     """
-    if float(np.abs(orbit.multipliers - 1.0).min()) > NEAR_CRITICAL:
+    if float(np.abs(place.orbit.multipliers - 1.0).min()) > NEAR_CRITICAL:
         return None
-    return true_crossing(orbit, first_step)
+    return true_crossing(place, longest)
 
 
-def distance(a: Orbit, b: Orbit) -> float:
-    """Distance of two orbits of one problem, relative to the first."""
-    return metric_length(a.problem.metric(a.point), b.point - a.point)
+def distance(a: Place, b: Place) -> float:
+    """Distance of two orbits of one family, relative to the first."""
+    return metric_length(a.family.metric(a.point), b.point - a.point)
 
 
-def true_crossing(orbit: Orbit, first_step: float = math.inf) -> Orbit | None:
+def true_crossing(place: Place, longest: float = math.inf) -> Solved | None:
     """Where branches cross beside an orbit, if they do."""
-    crossing = nearest_crossing(orbit, first_step)
+    crossing = nearest_crossing(place, longest)
     return crossing[0] if crossing is not None and crossing[1] <= CROSSES else None
 
 
@@ -88,9 +88,9 @@ def _turns_twice(a: SpecialPoint, b: SpecialPoint) -> bool:
 
 def same_crossing(a: SpecialPoint, b: SpecialPoint) -> bool:
     """Whether two special points are one branch point."""
-    return a.kind == b.kind == "BP" and distance(a.orbit, b.orbit) < SAME
+    return a.kind == b.kind == "BP" and distance(a.point, b.point) < SAME
 
 
 def _pace(special: SpecialPoint) -> float:
-    """How fast the frequency changes along the branch."""
+    """How fast the parameter changes along the branch."""
     return abs(float(special.point.tangent[-1]))

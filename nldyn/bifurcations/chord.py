@@ -13,8 +13,8 @@ from nldyn.bifurcations.branch_crossing import NEIGHBOUR, SHORTEST_CROSSING
 from nldyn.bifurcations.normal_form_coefficients import correct_across
 from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.sign_changes import crosses
+from nldyn.orbits.bordered import FREE, Place, Solved, correct
 from nldyn.orbits.conditions import TOUCH, depth_row
-from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length
 
 BESIDE = 1e-3  # in σ: the least distance of points that tell the direction of a branch
@@ -37,11 +37,11 @@ class Chord:
 
     @cached_property
     def _secant(self) -> Real:
-        return self.last.orbit.point - self.first.orbit.point
+        return self.last.point - self.first.point
 
     @cached_property
     def _weights(self) -> Real:
-        return self.first.orbit.problem.metric(self.first.orbit.point)
+        return self.first.family.metric(self.first.point)
 
     @cached_property
     def _length(self) -> float:
@@ -50,10 +50,9 @@ class Chord:
     @cached_property
     def row(self) -> Real:
         """Along the secant, or the slope of a touch's depth if that rises or falls all the way."""
-        a = self.first.orbit
         row = self._weights * self._secant
         if abs(self.last.arclength - self.first.arclength) < TOUCH:
-            depth = depth_row(a)
+            depth = depth_row(self.first)
             ways = self._secant, self.first.tangent, self.last.tangent
             if depth is not None and abs(sum(np.sign(depth @ way) for way in ways)) == len(ways):
                 row = depth
@@ -78,18 +77,18 @@ class Chord:
         if sigma in self.known:
             return self.known[sigma]
         a = self.first
-        problem = a.orbit.problem
         row = self.row
-        offset = float(row @ (a.orbit.point + sigma * self._secant))
+        level = float(row @ (a.point + sigma * self._secant))
         guess = self.between(sigma)
-        found = problem.correct(guess, row, offset=offset, like=self._nearest(sigma).orbit.motion)
+        like = self._nearest(sigma).orbit.motion
+        found = correct(a.family, guess, FREE, row, level, like=like)
         beside = found.converged and self._is_beside(found.point - guess)
-        crossing = None if beside else self._where_branches_cross(guess, offset)
+        crossing = None if beside else self._where_branches_cross(guess, level)
         if crossing is not None:
-            orbit, tangent = crossing, self.direction(sigma)
+            place: Place = crossing
+            tangent = self.direction(sigma)
         elif found.converged:
-            orbit = Orbit.of(problem, found, a.orbit.observe)
-            tangent = problem.tangent(found, self._secant)
+            place, tangent = found, found.tangent(self._secant)
             if float(row @ tangent) * float(row @ self._secant) < 0.0:
                 tangent = -tangent
             if self._across(tangent):
@@ -97,29 +96,29 @@ class Chord:
         else:
             raise LocateError(found.failure)
         length = a.arclength + sigma * (self.last.arclength - a.arclength)
-        point = BranchNode(orbit, tangent, length)
+        point = BranchNode.of(place, tangent, length)
         if crosses(self.first, point) and crosses(self.last, point):
             raise LocateError("the branch turns within one step")
         self.known[sigma] = point
         return point
 
-    def place(self, orbit: Orbit) -> float:
+    def place(self, place: Place) -> float:
         """Position σ of an orbit of the branch, which may lie beyond the ends."""
-        way = orbit.point - self.first.orbit.point
+        way = place.point - self.first.point
         return float(self.row @ way) / float(self.row @ self._secant)
 
-    def with_place(self, orbit: Orbit) -> BranchNode:
+    def with_place(self, place: Place) -> BranchNode:
         """An orbit with the place and the tangent that the chord gives it."""
-        sigma = self.place(orbit)
+        sigma = self.place(place)
         length = self.last.arclength - self.first.arclength
-        return BranchNode(orbit, self.direction(sigma), self.first.arclength + sigma * length)
+        return BranchNode.of(place, self.direction(sigma), self.first.arclength + sigma * length)
 
-    def passes(self, orbit: Orbit, off: float) -> bool:
+    def passes(self, place: Place, off: float) -> bool:
         """Whether an orbit lies on the chord, but for a part of its length."""
-        sigma = self.place(orbit)
+        sigma = self.place(place)
         if not -off <= sigma <= 1.0 + off:
             return False
-        away = orbit.point - self.between(min(max(sigma, 0.0), 1.0))
+        away = place.point - self.between(min(max(sigma, 0.0), 1.0))
         return metric_length(self._weights, away) <= off * self._length
 
     def between(self, sigma: float) -> Real:
@@ -130,9 +129,9 @@ class Chord:
         x = (sigma - below) / (above - below)
         start, end = ((above - below) * self._slope(point) for point in (a, b))
         return np.asarray(
-            (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a.orbit.point
+            (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a.point
             + x * (1.0 - x) ** 2 * start
-            + x * x * (3.0 - 2.0 * x) * b.orbit.point
+            + x * x * (3.0 - 2.0 * x) * b.point
             + x * x * (x - 1.0) * end
         )
 
@@ -153,7 +152,7 @@ class Chord:
         a, b, width = self.at(below), self.at(above), above - below
         x = (sigma - below) / width
         towards = (
-            6.0 * x * (1.0 - x) * (b.orbit.point - a.orbit.point) / width
+            6.0 * x * (1.0 - x) * (b.point - a.point) / width
             + (1.0 - x) * (1.0 - 3.0 * x) * self._slope(a)
             + x * (3.0 * x - 2.0) * self._slope(b)
         )
@@ -162,13 +161,10 @@ class Chord:
     def _unit(self, vector: Real) -> Real:
         return np.asarray(vector / metric_length(self._weights, vector))
 
-    def _where_branches_cross(self, guess: Real, offset: float) -> Orbit | None:
+    def _where_branches_cross(self, guess: Real, level: float) -> Solved | None:
         """The orbit of this branch beside a guess, if another branch crosses it there."""
-        problem = self.first.orbit.problem
-        crossing = correct_across(problem, guess, self.row, offset)
-        if crossing is None or crossing[2] > CROSSING_ERROR:
-            return None
-        return Orbit(problem, *crossing, self.first.orbit.observe)
+        crossing = correct_across(self.first.family, guess, self.row, level)
+        return None if crossing is None or crossing.orbit.error > CROSSING_ERROR else crossing
 
     def _is_beside(self, way: Real) -> bool:
         """Whether a way from the chord is no longer than the chord, or than that of a crossing."""
@@ -180,8 +176,8 @@ class Chord:
         pace = metric_length(self._weights, tangent)
         return self._length > BEND and along < STEEPEST * self._length * pace
 
-    def frequency_slope(self, point: BranchNode) -> float:
-        """Derivative of ln ω with respect to σ."""
+    def pace(self, point: BranchNode) -> float:
+        """Derivative of the parameter's coordinate with respect to σ."""
         return float(self._slope(point)[-1])
 
     def _slope(self, point: BranchNode) -> Real:

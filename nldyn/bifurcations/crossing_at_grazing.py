@@ -23,10 +23,9 @@ from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import accounted, changed
 from nldyn.bifurcations.touching import Touch, touches_sharply, touching_extremes
-from nldyn.orbits.bordered import length_unit
+from nldyn.orbits.bordered import Place, length_unit
 from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.critical_functions import branch_point_test
-from nldyn.orbits.orbit import Orbit
 
 MET = 1e-13  # of an orbit's size: how well a depth is met
 ROUNDED = 1e-11  # the same where rounding forbids more
@@ -48,7 +47,7 @@ class ByDepth:
 
     chord: Chord
     touch: Touch
-    _known: dict[float, Orbit] = field(default_factory=dict, init=False, repr=False)
+    _known: dict[float, Place] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def ends(self) -> tuple[float, float]:
@@ -56,7 +55,7 @@ class ByDepth:
         first, last = (self.touch.depth(end) for end in (self.chord.first, self.chord.last))
         return _signed_root(first), _signed_root(last)
 
-    def at(self, signed_root: float) -> Orbit:
+    def at(self, signed_root: float) -> Place:
         """The orbit of the branch whose extreme has a depth, given by its signed root.
 
         Raises
@@ -66,37 +65,37 @@ class ByDepth:
         """
         depth = signed_root * abs(signed_root)
         for start in self._guesses(depth):
-            orbit = self._with_depth(depth, start)
-            if orbit is not None:
-                self._known[depth] = orbit
-                return orbit
+            found = self._with_depth(depth, start)
+            if found is not None:
+                self._known[depth] = found
+                return found
         raise LocateError("no orbit with a given depth was found")
 
     def _guesses(self, depth: float) -> Iterator[Real]:
         """Points near the orbit sought: on the chord, then the orbits known, the nearest first."""
         first, last = (s * abs(s) for s in self.ends)
         yield self.chord.between((depth - first) / (last - first))
-        known = self._known | {first: self.chord.first.orbit, last: self.chord.last.orbit}
-        for _, orbit in sorted(known.items(), key=lambda pair: abs(pair[0] - depth)):
-            yield orbit.point
+        known: dict[float, Place] = self._known | {first: self.chord.first, last: self.chord.last}
+        for _, place in sorted(known.items(), key=lambda pair: abs(pair[0] - depth)):
+            yield place.point
 
-    def _with_depth(self, depth: float, point: Real) -> Orbit | None:
+    def _with_depth(self, depth: float, point: Real) -> Place | None:
         """The orbit with a depth, by Newton's method from a point, if it lies on this branch."""
-        a = self.chord.first.orbit
+        a, family = self.chord.first.orbit, self.chord.first.family
         touch, row = self.touch, self.chord.row
         grazing = Grazing(touch.output, touch.is_maximum, touch.phase, length_unit(a))
         offset, miss = float(row @ point), math.inf
         unsure = max(CROSSES, a.error, self.chord.last.orbit.error)  # of what leads to the guess
         for _ in range(MOST_STEPS):
-            found = correct_across(a.problem, point, row, offset)
-            if found is None or found[2] > CROSSING_ERROR:
+            found = correct_across(family, point, row, offset)
+            if found is None or found.orbit.error > CROSSING_ERROR:
                 return None
-            orbit, before = Orbit(a.problem, *found, a.observe), miss
+            orbit, before = found.orbit, miss
             phase, reached = grazing.extreme(orbit)
             miss = abs(reached - depth) / grazing.unit
             if orbit.error <= unsure and (miss < MET or 0.5 * before < miss < ROUNDED):
-                return orbit if self.chord.passes(orbit, BESIDE) else None
-            point, row = orbit.point, grazing.slope(orbit, phase)
+                return found if self.chord.passes(found, BESIDE) else None
+            point, row = found.point, grazing.slope(found, phase)
             offset = float(row @ point) + depth - reached
         return None
 
@@ -120,7 +119,7 @@ def special_points_at_grazing(a: BranchNode, b: BranchNode) -> list[SpecialPoint
         found = [_special("GR", orbits.at(0.0), orbits.chord)]
         if changes:
             share, _ = root(
-                lambda x: branch_point_test(orbits.at(first + x * (last - first)).multipliers)
+                lambda x: branch_point_test(orbits.at(first + x * (last - first)).orbit.multipliers)
             )
             crossing = orbits.at(first + share * (last - first))
             before = share < first / (first - last)
@@ -134,7 +133,7 @@ def _signed_root(depth: float) -> float:
     return math.copysign(math.sqrt(abs(depth)), depth)
 
 
-def _special(kind: str, orbit: Orbit, chord: Chord) -> SpecialPoint:
+def _special(kind: str, place: Place, chord: Chord) -> SpecialPoint:
     """A special point of a branch, with place and tangent of its chord."""
     ends = max(chord.first.orbit.error, chord.last.orbit.error)  # their part along the null vector
-    return SpecialPoint(kind, chord.with_place(orbit), orbit.error + ends)
+    return SpecialPoint(kind, chord.with_place(place), place.orbit.error + ends)

@@ -28,7 +28,7 @@ from nldyn.bifurcations.sign_changes import (
     tests,
 )
 from nldyn.bifurcations.touching import Touch, changes_hidden_by_birth, touching_extremes
-from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.bordered import Solved
 
 PASSED = 1e-6  # least of a branch point's test on both sides of a fold that is no crossing
 MIXED = 1e-5  # distance from a crossing within which a tangent may be of both branches
@@ -45,7 +45,7 @@ def locate(kind: str, chord: Chord, test: Callable[[BranchNode], float]) -> Spec
     """
     sigma, error = root(lambda x: test(chord.at(x)))
     point = chord.at(sigma)
-    return SpecialPoint(kind, point, error * abs(chord.frequency_slope(point)) + point.orbit.error)
+    return SpecialPoint(kind, point, error * abs(chord.pace(point)) + point.orbit.error)
 
 
 def located_between(a: BranchNode, b: BranchNode, depth: int = 0) -> list[SpecialPoint]:
@@ -95,23 +95,22 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
         return []
     if kind == "LP" and _is_plain_fold(chord):
         return [special]
-    if kind == "LP" and not _turns_beside(special.orbit, chord):
+    if kind == "LP" and not _turns_beside(special.point, chord):
         crossing = _crossing_at_an_end(chord)
         if crossing is not None:
-            at = replace(special.point, orbit=crossing)
-            return [_along(chord, SpecialPoint("BP", at, crossing.error))]
+            return [SpecialPoint("BP", chord.with_place(crossing), crossing.orbit.error)]
     return [_along(chord, _crossing_or_fold(special))]
 
 
-def _turns_beside(fold: Orbit, chord: Chord) -> bool:
+def _turns_beside(fold: BranchNode, chord: Chord) -> bool:
     """Whether the branch turns at a fold, not where the tangent jumps elsewhere on the chord."""
     sigma = chord.place(fold)
     return "LP" in changed(chord.at(sigma - BESIDE), chord.at(sigma + BESIDE))
 
 
-def _crossing_at_an_end(chord: Chord) -> Orbit | None:
+def _crossing_at_an_end(chord: Chord) -> Solved | None:
     """Where branches cross so near to an end of a chord that its tangent may be of both."""
-    return crossing_within(chord.first.orbit, MIXED) or crossing_within(chord.last.orbit, MIXED)
+    return crossing_within(chord.first, MIXED) or crossing_within(chord.last, MIXED)
 
 
 def _vanishes(touch: Touch, at: BranchNode, a: BranchNode, b: BranchNode) -> bool:
@@ -151,14 +150,14 @@ def _crossing_or_fold(special: SpecialPoint) -> SpecialPoint:
     symmetry is not perfect it is folded beside it: then the crossing has an unfolding. A branch
     point is solved for by its own system, whose digits do not depend on the branch.
     """
-    turns = special.kind == "LP" and turns_near_crossing(special.orbit)
+    turns = special.kind == "LP" and turns_near_crossing(special.point)
     if special.kind != "BP" and not turns:
         return special
-    orbit = true_crossing(special.orbit)
-    if orbit is None or distance(special.orbit, orbit) > NEIGHBOUR:
+    crossing = true_crossing(special.point)
+    if crossing is None or distance(special.point, crossing) > NEIGHBOUR:
         return special
-    point = BranchNode(orbit, special.point.tangent, special.point.arclength)
-    return SpecialPoint("BP", point, special.frequency_error)
+    point = BranchNode.of(crossing, special.point.tangent, special.point.arclength)
+    return SpecialPoint("BP", point, special.error)
 
 
 def _along(chord: Chord, special: SpecialPoint) -> SpecialPoint:
@@ -168,4 +167,4 @@ def _along(chord: Chord, special: SpecialPoint) -> SpecialPoint:
     """
     if special.kind != "BP":
         return special
-    return replace(special, point=chord.with_place(special.orbit))
+    return replace(special, point=chord.with_place(special.point))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import FAILURES, ComputationError
-from nldyn.orbits.orbit import Orbit
-from nldyn.orbits.shooting import ShootingProblem
+from nldyn.base.errors import FAILURES, ComputationError, ConvergenceError
+from nldyn.orbits.bordered import OrbitFamily, Place, Solved
 
 LARGEST_STEP = 0.1  # in ξ, of the differences
 SMALLEST_STEP = 1e-7
@@ -238,34 +237,33 @@ def operator(jacobians: Real, mu: complex) -> Vectors:
     return matrix.reshape(k * n, k * n)
 
 
-def loop_of(orbit: Orbit) -> Loop:
-    """The segments of an orbit as maps of its states and P = ln ω, with the finer flow map.
+def loop_of(place: Place) -> Loop:
+    """The segments of an orbit as maps of its states and its parameter, with the finer flow map.
 
-    ξ = 1 is a change of the orbit by its own size, as in the metric of the arclength. What must
-    stay the same is how often each stop closes, and which are closed at the nodes.
+    P is the parameter's coordinate, ln ω for the frequency, and ξ = 1 a change of the orbit by its
+    own size, as in the metric of the arclength. What must stay the same is how often each stop
+    closes, and which are closed at the nodes.
     """
-    problem = orbit.problem
-    flow = problem.flow.finer
-    stops = orbit.system.stops
-    rows, gaps = flow.rows[: len(stops)], np.array([stop.gap for stop in stops])
+    family = place.family
+    finer = replace(family, problem=replace(family.problem, flow=family.problem.flow.finer))
+    nodes = place.point[:-1].reshape(family.segments, -1)
 
     def evaluate(nodes: Real, parameter: float) -> Evaluation:
-        omega = math.exp(parameter)
-        found = flow.shoot(nodes, problem.phases, omega)
-        if found.failure:
-            raise CoefficientError(found.failure)
-        closed = nodes @ rows.T > gaps
-        pattern = (found.closings.tobytes(), closed.tobytes())
-        return found.jacobians, omega * found.d_omega, pattern
+        at = finer.at(np.append(nodes.ravel(), parameter))
+        try:
+            jacobians, pace = at.blocks, at.by_parameter(0)
+        except ConvergenceError as error:
+            raise CoefficientError(str(error)) from None
+        flow = at.problem.flow
+        gaps = np.array([stop.gap for stop in flow.system.stops])
+        closed = at.nodes @ flow.rows[: gaps.size].T > gaps
+        return jacobians, pace, (at.segments.closings.tobytes(), closed.tobytes())
 
-    nodes = problem.nodes(orbit.point)
-    return Loop(nodes, float(orbit.point[-1]), evaluate, problem.scale(orbit.point))
+    return Loop(nodes, float(place.point[-1]), evaluate, family.scale(place.point))
 
 
-def correct_across(
-    problem: ShootingProblem, guess: Real, row: Real, offset: float
-) -> tuple[Real, Real, float] | None:
-    """Orbit on the plane ``row @ point = offset`` where branches cross nearby.
+def correct_across(family: OrbitFamily, guess: Real, row: Real, level: float) -> Solved | None:
+    """Orbit on the plane ``row @ point = level`` where branches cross nearby.
 
     There the shooting equations are nearly singular and Newton's method loses the digits that they
     lose. So the component along the null vector q is held at that of the guess, and a multiple β of
@@ -274,45 +272,47 @@ def correct_across(
 
     Returns
     -------
-    point, jacobians, error : (N + 1,), (k, 2n, 2n), float
-        The error is the last step or β, relative to the orbit, whichever is larger; None if
+    Solved or None
+        The orbit's error is the last step or β, relative to the orbit, whichever is larger; None if
         Newton's method fails or there is no multiplier near 1.
 
     References
     ----------
     Govaerts (2000), chapter 3 (bordered systems).
     """
-    flow, size = problem.flow, guess.size - 1
-    scale = problem.scale(guess) * math.sqrt(problem.segments)
+    size = guess.size - 1
+    scale = family.scale(guess) * math.sqrt(family.segments)
     bordered = np.zeros((size + 2, size + 2))
     point = guess.copy()
     q: Real | None = None
     for _ in range(8):
-        nodes, omega = problem.nodes(point), math.exp(point[-1])
-        found = flow.shoot(nodes, problem.phases, omega)
-        if found.failure:
+        at = family.at(point)
+        try:
+            matrix = operator(at.blocks, 1.0)
+            bordered[:size, size] = at.by_parameter(0).ravel()
+            defect = at.residual
+        except ConvergenceError:
             return None
-        matrix = operator(found.jacobians, 1.0)
         if q is None:
             left, values, right = np.linalg.svd(matrix)
             if values[-1] > NOT_NEAR * values[0]:
                 return None
             q, y = right[-1], left[:, -1]
-        bordered[:size, :size], bordered[:size, size] = matrix, omega * found.d_omega.ravel()
+        bordered[:size, :size] = matrix
         bordered[:size, -1], bordered[size, :-1], bordered[-1, :size] = y, row, q
-        defect = (found.ends - np.roll(nodes, -1, axis=0)).ravel()
-        rest = np.append(defect, [row @ point - offset, q @ (point - guess)[:size]])
+        rest = np.append(defect, [row @ point - level, q @ (point - guess)[:size]])
         step = np.linalg.solve(bordered, -rest)
         point = point + step[:-1]
         if not abs(step[size]) < FARTHEST:
             return None
         moved = float(np.linalg.norm(step[:size])) / scale
         if moved < SOLVED:
-            return point, found.jacobians, max(moved, abs(float(step[-1])) / scale)
+            error = max(moved, abs(float(step[-1])) / scale)
+            return Solved(family, point, family.at(point).orbit_by(at.segments.jacobians, error))
     return None
 
 
-def turns_near_crossing(orbit: Orbit) -> bool:
+def turns_near_crossing(place: Place) -> bool:
     """Whether a branch that turns at an orbit may cross another one there, and not be folded.
 
     At a fold the equations' derivative with respect to P has a part that no change of the states
@@ -321,7 +321,7 @@ def turns_near_crossing(orbit: Orbit) -> bool:
     fold.
     """
     try:
-        loop = loop_of(orbit)
+        loop = loop_of(place)
         q, y = loop.critical(1.0)
         part = abs(float(np.sum(y * loop.by_parameter)))
         if part > PLAIN * float(np.linalg.norm(y) * np.linalg.norm(loop.by_parameter)):

@@ -33,10 +33,11 @@ from nldyn.bifurcations.normal_form_coefficients import (
     loop_of,
     torus,
 )
-from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special, on_branch
 from nldyn.bifurcations.rigid_grazing import RigidGrazing, RootMap, turned
 from nldyn.bifurcations.rigid_touch import Touches
-from nldyn.orbits.conditions import AT_NODE, Grazing
+from nldyn.orbits.bordered import FREE, Place, correct
+from nldyn.orbits.conditions import Grazing, output_slope
 from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import asymmetry, metric_length
 from nldyn.system.naming import stop_name
@@ -142,13 +143,14 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
     check_types(others=(others, Sequence))
     for other in others:
         check_special("describe_special: others", other, of_branch=False)
+    special = on_branch(special)
     if special.kind == "GR":
         return _grazing(special, others)
     kinds = {"LP": _fold, "PD": _flip, "NS": _torus, "BP": _branch_point}
     if special.kind not in kinds:
         raise SystemModelError(f"no special point is of the kind {special.kind!r}")
     try:
-        return kinds[special.kind](special, loop_of(special.orbit))
+        return kinds[special.kind](special, loop_of(special.point))
     except FAILURES as error:
         title, name = {
             "LP": ("Fold", "fold"),
@@ -173,7 +175,7 @@ def _fold(special: SpecialPoint, loop: Loop) -> NormalForm:
     if others:
         which = f"both are unstable, {_other_multipliers(others)}"
     else:
-        growth = -form.nonlinear.value * displacement_along(special.orbit, q)
+        growth = -form.nonlinear.value * displacement_along(special.point, q)
         which = f"the one of {'larger' if growth > 0.0 else 'smaller'} displacement is stable"
     sentence = (
         f"Fold at {hz}: two orbits exist {SIDES[side]} {hz} and neither {SIDES[-side]} it; {which}."
@@ -181,31 +183,14 @@ def _fold(special: SpecialPoint, loop: Loop) -> NormalForm:
     return NormalForm("fold", sentence, form.nonlinear, shift, side, not others)
 
 
-def displacement_along(orbit: Orbit, q: Real) -> float:
+def displacement_along(place: Place, q: Real) -> float:
     """Derivative of the largest observed displacement along a change q (k, 2n) of the nodes."""
+    orbit = place.orbit
     extremes = orbit.observed_extremes
     index = int(np.argmax(np.abs(extremes.values)))
     output = orbit.system.output(orbit.observe)
-    change, _ = output_change(orbit, output, float(extremes.phases[index]), q)
-    return math.copysign(1.0, float(extremes.values[index])) * change
-
-
-def output_change(orbit: Orbit, output: int, phase: float, q: Real) -> tuple[float, float]:
-    """Derivatives of an output at a phase along a change q of the nodes, and with respect to P."""
-    problem = orbit.problem
-    row = problem.flow.rows[output]
-    carried = float(problem.flow.ride(output, orbit.omega).by_log_omega(np.array(phase)))
-    j = int(np.searchsorted(problem.phases, phase, side="right")) - 1
-    j = min(max(j, 0), problem.segments - 1)
-    start = float(problem.phases[j])
-    if phase - start < AT_NODE:
-        return float(row @ q[j]), carried
-    node = problem.nodes(orbit.point)[j]
-    found = problem.flow.shoot(node[None], np.array([start, phase]), orbit.omega)
-    if found.failure:
-        raise CoefficientError(found.failure)
-    by_omega = float(row @ found.d_omega[0]) * orbit.omega
-    return float(row @ found.jacobians[0] @ q[j]), by_omega + carried
+    segment, row, _ = output_slope(place, output, float(extremes.phases[index]))
+    return math.copysign(1.0, float(extremes.values[index])) * float(row @ q[segment])
 
 
 # --- flips ---------------------------------------------------------------------------------------
@@ -414,10 +399,10 @@ def other_tangent(special: SpecialPoint) -> Real:
     Of the two solutions of the branching equation it is the one further from the direction of the
     branch on which the point was found.
     """
-    found = crossing(loop_of(special.orbit))
+    found = crossing(loop_of(special.point))
     if not found.roots:
         raise CoefficientError("the branching equation has no real solution")
-    weights = special.orbit.problem.metric(special.orbit.point)
+    weights = special.point.family.metric(special.point.point)
     tangents = []
     for alpha, beta in found.roots:
         tangent = np.append((alpha * found.q + beta * found.v).ravel(), beta)
@@ -433,16 +418,14 @@ def _step_off(special: SpecialPoint, direction: Real, amplitude: float) -> Branc
     The distance must be short where a linear stop is just touched beside the branch point: the
     other branch bends there and has another tangent behind.
     """
-    orbit = special.orbit
-    problem = orbit.problem
-    row = problem.metric(orbit.point) * direction
+    family, place = special.point.family, special.point.point
+    row = family.metric(place) * direction
     row /= np.linalg.norm(row)
     for share in SHARES:
         size = share * amplitude
-        found = problem.correct(orbit.point + size * direction, row, longest=size)
+        found = correct(family, place + size * direction, FREE, row, longest=size)
         if found.converged:
-            tangent = problem.tangent(found, direction)
-            return BranchNode(Orbit.of(problem, found, orbit.observe), tangent, 0.0)
+            return BranchNode.of(found, found.tangent(direction), 0.0)
     raise LocateError(f"no orbit found beside the branch point at {_hz(special)}: {found.failure}")
 
 
@@ -463,10 +446,10 @@ def _grazing(special: SpecialPoint, others: Sequence[SpecialPoint]) -> NormalFor
     output, phase, is_maximum = touches[0]
     states = special.point.tangent[:-1].reshape(orbit.problem.segments, -1)
     try:
-        along, by_parameter = output_change(orbit, output, phase, states)
+        segment, row, by_parameter = output_slope(special.point, output, phase)
         pace = float(special.point.tangent[-1])
-        slope = (along + by_parameter * pace) * pace
-    except CoefficientError:
+        slope = (float(row @ states[segment]) + by_parameter * pace) * pace
+    except FAILURES:
         slope = 0.0
     side = int(np.sign(slope)) * (1 if is_maximum else -1)
     stops = " and ".join(_stop_name(orbit, *touch[:2]) for touch in touches)
@@ -647,4 +630,4 @@ def _other_multipliers(count: int) -> str:
 
 
 def _hz(special: SpecialPoint) -> str:
-    return f"{special.frequency_hz:.6g} Hz"
+    return special.place()

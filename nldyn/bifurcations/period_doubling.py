@@ -6,28 +6,28 @@ import numpy as np
 from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import LocateError, check_positive, failing_as
+from nldyn.base.errors import ConvergenceError, LocateError, check_positive, failing_as
 from nldyn.bifurcations.chord import Chord
-from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special, on_branch, place_of
+from nldyn.orbits.bordered import FREE, OrbitFamily, Place, Solved, correct
 from nldyn.orbits.conditions import nearest_flip
-from nldyn.orbits.newton import refine
-from nldyn.orbits.orbit import Orbit, minimal_period
-from nldyn.orbits.shooting import ShootingProblem, metric_length
+from nldyn.orbits.orbit import minimal_period
+from nldyn.orbits.shooting import metric_length
 
 OPPOSITE = 0.8  # cosine from which two differences of halves point opposite ways
+MOST_ITERATIONS = 25  # of Newton's method from where two halves agree
 SHARES = (1.0, 0.25, 0.05, 0.01, 2e-3, 4e-4)  # of the amplitude, that a branch may need to begin
 NEAR_ONE = 0.3  # distance of a multiplier from 1 on a branch that has just begun
 
 
-def passed_flip(a: Orbit, b: Orbit) -> bool:
+def passed_flip(a: Place, b: Place) -> bool:
     """Whether an even-period orbit turned into its own shift: a branch of half the period met.
 
     At the flip the two halves of the orbit are equal; behind it they have changed places.
     """
-    if a.period % 2:
+    if a.orbit.period % 2:
         return False
-    first = half_difference(a.problem, a.point)
-    second = half_difference(b.problem, b.point)
+    first, second = half_difference(a.family, a.point), half_difference(b.family, b.point)
     product = float(first @ second)
     return product < -OPPOSITE * float(np.linalg.norm(first) * np.linalg.norm(second))
 
@@ -44,37 +44,37 @@ def flip_between(a: BranchNode, b: BranchNode) -> BranchNode:
     ConvergenceError
         If Newton's method finds no such orbit.
     """
-    chord = Chord(a, b)
-    problem = a.orbit.problem
-    reference = half_difference(problem, a.orbit.point)
+    chord, family = Chord(a, b), a.family
+    reference = half_difference(family, a.point)
 
     def difference(sigma: float) -> float:
-        return float(reference @ half_difference(problem, chord.between(sigma)))
+        return float(reference @ half_difference(family, chord.between(sigma)))
 
     sigma = float(brentq(difference, 0.0, 1.0))
-    point = chord.between(sigma)
-    nodes = problem.nodes(point)
-    half = nodes.shape[0] // 2
-    single = ShootingProblem(problem.flow, problem.period // 2, half)
-    mean = 0.5 * (nodes[:half] + nodes[half:])
-    orbit = refine(single, mean, float(np.exp(point[-1])), a.orbit.observe)
-    orbit = nearest_flip(orbit) or orbit
-    states = np.tile(single.nodes(orbit.point), (2, 1)).ravel()
-    doubled = Orbit(
-        problem,
-        np.append(states, orbit.point[-1]),
-        np.concatenate([orbit.jacobians, orbit.jacobians]),
-        orbit.error,
-        orbit.observe,
-    )
-    return BranchNode(doubled, a.tangent, a.arclength + sigma * (b.arclength - a.arclength))
+    first, second = np.split(chord.between(sigma)[:-1], 2)
+    guess = np.append(0.5 * (first + second), chord.between(sigma)[-1])
+    held = np.zeros(guess.size)
+    held[-1] = 1.0
+    found = correct(family.halved, guess, FREE, held, max_iterations=MOST_ITERATIONS)
+    if not found.converged:
+        raise ConvergenceError(f"no orbit of period {family.halved.period}: {found.failure}")
+    single = nearest_flip(found) or found
+    length = a.arclength + sigma * (b.arclength - a.arclength)
+    return BranchNode.of(twice(single, family), a.tangent, length)
 
 
-def half_difference(problem: ShootingProblem, point: Real) -> Real:
+def twice(single: Place, family: OrbitFamily) -> Solved:
+    """An orbit run through twice, in a family of twice its period."""
+    orbit = single.orbit
+    point = np.append(np.tile(single.point[:-1], 2), single.point[-1])
+    jacobians = np.concatenate([orbit.jacobians, orbit.jacobians])
+    return Solved(family, point, family.at(point).orbit_by(jacobians, orbit.error))
+
+
+def half_difference(family: OrbitFamily, point: Real) -> Real:
     """First half of the states minus the second: zero for an orbit of half the period."""
-    nodes = problem.nodes(point)
-    half = nodes.shape[0] // 2
-    return (nodes[:half] - nodes[half:]).ravel()
+    first, second = np.split(point[: family.n_states], 2)
+    return np.asarray(first - second)
 
 
 def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchNode:
@@ -109,36 +109,35 @@ def switch_at_flip(special: SpecialPoint, amplitude: float = 0.02) -> BranchNode
 def _beside_flip(special: SpecialPoint, amplitude: float) -> BranchNode:
     """The first point of the doubled branch that Newton's method finds."""
     orbit = special.orbit
-    base = orbit.problem
-    problem = ShootingProblem(base.flow, 2 * base.period, 2 * base.segments)
+    place = on_branch(special).point
+    base, family = place.family, place.family.repeated(2)
     values, vectors = np.linalg.eig(orbit.monodromy)
     v = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
-    jacobians = base.flow.shoot(base.nodes(orbit.point), base.phases, orbit.omega).jacobians
-    modes = [v]
-    for jacobian in jacobians[:-1]:
+    at = base.at(place.point)
+    modes = [v if at.change is None else at.change[1] @ v]
+    for jacobian in at.blocks[:-1]:
         modes.append(jacobian @ modes[-1])
-    shape = np.array(modes)
-    direction = np.append(np.concatenate([shape, -shape]).ravel(), 0.0)
-    nodes = base.nodes(orbit.point)
-    doubled = np.append(np.concatenate([nodes, nodes]).ravel(), orbit.point[-1])
-    weights = problem.metric(doubled)
+    shape = np.array(modes).ravel()
+    direction = np.concatenate([shape, -shape, [0.0]])
+    doubled = np.append(np.tile(place.point[:-1], 2), place.point[-1])
+    weights = family.metric(doubled)
     direction /= metric_length(weights, direction)
     row = weights * direction
     first: BranchNode | None = None
     for share in SHARES:
         size = share * amplitude
-        found = problem.correct(doubled + size * direction, row / np.linalg.norm(row))
+        found = correct(family, doubled + size * direction, FREE, row / np.linalg.norm(row))
         if found.converged:
-            twin = Orbit.of(problem, found, orbit.observe)
-            if minimal_period(twin) < problem.period:
+            twin = found.orbit
+            if minimal_period(twin) < family.period:
                 continue
-            first = BranchNode(twin, problem.tangent(found, direction), 0.0)
+            first = BranchNode.of(found, found.tangent(direction), 0.0)
             near = np.abs(twin.multipliers - 1.0).min() < NEAR_ONE
             if twin.impacts == 2 * orbit.impacts and near:
                 break
     if first is not None:
         return first
     raise LocateError(
-        f"no orbit of period {problem.period} found beside the flip at "
-        f"{orbit.frequency_hz:.6g} Hz: {found.failure or 'only such of a shorter period'}"
+        f"no orbit of period {family.period} found beside the flip at {place_of(place)}: "
+        f"{found.failure or 'only such of a shorter period'}"
     )

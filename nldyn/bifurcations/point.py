@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, shown
+from nldyn.orbits.bordered import OrbitFamily, Place
 from nldyn.orbits.orbit import Orbit, shifted_alike, stroboscopic
+from nldyn.system.chart import told_value, value_of
+from nldyn.system.parameters import Parameter
 
 SAME_HZ, SAME_STATES = 1e-6, 1e-3  # relative, of an orbit at a special point or close beside it
 
@@ -20,16 +22,22 @@ class BranchNode:
 
     Parameters
     ----------
+    family : OrbitFamily
+        The orbits of the branch and others in the same parameter.
+    point : (N + 1,)
+        Unknowns of the family.
     orbit : Orbit
         The orbit.
     tangent : (N + 1,)
-        Unit tangent in the metric of the shooting problem.
+        Unit tangent in the metric of the family.
     arclength : float
         Relative arclength from the branch's first computed point.
     tests : dict of str to float
         Test functions, filled when first asked for (see `nldyn.bifurcations.sign_changes.tests`).
     """
 
+    family: OrbitFamily
+    point: Real
     orbit: Orbit
     tangent: Real
     arclength: float
@@ -38,6 +46,33 @@ class BranchNode:
     def __repr__(self) -> str:
         """One line: the orbit and where it is along the branch."""
         return f"<BranchNode at arclength {self.arclength:.4g}: {self.orbit!r}>"
+
+    @classmethod
+    def of(cls, place: Place, tangent: Real, arclength: float) -> BranchNode:
+        """An orbit of a family as a point of a branch."""
+        return cls(place.family, place.point, place.orbit, tangent, arclength)
+
+    @classmethod
+    def in_frequency(cls, orbit: Orbit, tangent: Real, arclength: float) -> BranchNode:
+        """A point of a branch in the frequency."""
+        family = OrbitFamily.in_frequency(orbit)
+        return cls(family, orbit.point, orbit, tangent, arclength)
+
+    @property
+    def value(self) -> float:
+        """Value of the parameter."""
+        if self.family.in_frequency_alone:
+            return self.orbit.frequency_hz
+        return float(self.family.values(self.point)[0])
+
+    @property
+    def parameter(self) -> Parameter:
+        """What changes along the branch."""
+        return self.family.charts[0].parameter
+
+    def reversed(self) -> BranchNode:
+        """The same point of the branch run through the other way."""
+        return replace(self, tangent=-self.tangent, arclength=-self.arclength, tests={})
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,19 +85,20 @@ class SpecialPoint:
         Cyclic fold, flip, Neimark-Sacker, branch point, grazing.
     point : BranchNode
         The orbit at which it happens.
-    frequency_error : float
-        Estimated error of the root in frequency and the last Newton step, relative.
+    error : float
+        Estimated error of the root in the parameter and the last Newton step, relative; of a
+        parameter that may be zero or negative, relative to the width of its range.
     """
 
     kind: str
     point: BranchNode
-    frequency_error: float
+    error: float
 
     def __repr__(self) -> str:
-        """One line: kind, frequency with its error, the orbit's period and size."""
-        orbit = self.orbit
+        """One line: kind, parameter with its error, the orbit's period and size."""
+        orbit, place = self.orbit, self.place(9)
         return (
-            f"<{self.kind} at {self.frequency_hz:.9g} Hz (error {self.frequency_error:.1g}): "
+            f"<{self.kind} at {place} (error {self.error:.1g}): "
             f"period {orbit.period}, {orbit.max_abs_displacement:.4g} m>"
         )
 
@@ -75,6 +111,45 @@ class SpecialPoint:
     def frequency_hz(self) -> float:
         """Excitation frequency in Hz."""
         return self.point.orbit.frequency_hz
+
+    @property
+    def value(self) -> float:
+        """Value of the parameter that changes along the branch."""
+        return self.point.value
+
+    @property
+    def frequency_error(self) -> float:
+        """`error` where the frequency changes; else it is exact."""
+        return self.error if self.point.family.in_frequency_alone else 0.0
+
+    @property
+    def value_error(self) -> float:
+        """Estimated error of the value."""
+        chart = self.point.family.charts[0]
+        return self.error * chart.slope(float(self.point.point[-1]))
+
+    def place(self, digits: int = 6) -> str:
+        """The value of the parameter, in words."""
+        return place_of(self.point, digits)
+
+
+def on_branch(special: SpecialPoint) -> SpecialPoint:
+    """A special point in a family; in the frequency if it is not one of a branch.
+
+    Then it has no direction.
+    """
+    if isinstance(getattr(special, "point", None), BranchNode):
+        return special
+    node = BranchNode.in_frequency(special.orbit, np.zeros(special.orbit.point.size), 0.0)
+    return SpecialPoint(special.kind, node, float(getattr(special, "error", 0.0)))
+
+
+def place_of(node: BranchNode, digits: int = 6) -> str:
+    """Where a point of a branch is: the value of its parameter, in words.
+
+    The frequency is told without its name.
+    """
+    return told_value(node.parameter, node.value, digits=digits)
 
 
 def check_special(caller: str, special: object, kind: str = "", *, of_branch: bool = True) -> None:
@@ -105,7 +180,9 @@ def is_at(orbit: Orbit, special: SpecialPoint, multiple: int = 1) -> bool:
     other = special.orbit
     if orbit.period != multiple * other.period:
         return False
-    if not math.isclose(orbit.frequency_hz, special.frequency_hz, rel_tol=SAME_HZ):
+    chart = special.point.family.charts[0]
+    value = value_of(orbit.system, orbit.frequency_hz, chart.parameter)
+    if not abs(chart.coordinate(value) - float(special.point.point[-1])) <= SAME_HZ:
         return False
     states = np.tile(stroboscopic(other), (multiple, 1))
     return shifted_alike(stroboscopic(orbit), states, SAME_STATES * float(np.abs(states).max()))

@@ -97,9 +97,8 @@ class Touches:
         family = family or OrbitFamily.in_frequency(orbit)
         point, size = family.unknowns(orbit), float(np.abs(orbit.point[:-1]).max())
         nodes = point[: family.n_states].reshape(base.segments, -1)
-        longer = replace(family, period=times * base.period, segments=times * base.segments)
         here = cls(
-            longer,
+            family.repeated(times),
             grazing.passages,
             tuple(stops * times),
             np.empty((0, base.size)),

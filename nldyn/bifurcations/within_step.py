@@ -80,8 +80,7 @@ def passes_node(a: BranchNode, b: BranchNode) -> bool:
     """
     if not a.orbit.system.jumps:
         return False
-    weights = a.orbit.problem.metric(a.orbit.point)
-    way = metric_length(weights, b.orbit.point - a.orbit.point)
+    way = metric_length(a.family.metric(a.point), b.point - a.point)
     if way > MOST_BENT * abs(b.arclength - a.arclength):
         return True
     return bool((impacts_by_segment(a.orbit) != impacts_by_segment(b.orbit)).any())
@@ -195,7 +194,7 @@ def looked_into(
         return []
     chord = Chord(a, b)
     beside = [p for p in (z, c) if p is not None and p.orbit.impacts == a.orbit.impacts]
-    places = {chord.place(p.orbit): p for p in beside}
+    places = {chord.place(p): p for p in beside}
     places = {x: p for x, p in places.items() if x < -CLOSE or x > 1.0 + CLOSE}
     near = sorted([*places.items(), (0.0, a), (1.0, b)], key=itemgetter(0))
     where = Between([p.orbit for _, p in near], [x for x, _ in near]).where_to_look()
@@ -256,7 +255,7 @@ def turned_over(
         sigma = min(max((where - first.arclength) / span, WITHIN), 1.0 - WITHIN)
         extra = Chord(first, last).at(sigma)
         if differs(a, extra):
-            return None if lies_on_crossing(extra.orbit, ON_CROSSING) else extra
+            return None if lies_on_crossing(extra, ON_CROSSING) else extra
         triples = ((a, extra, b), (z, a, extra)) if ahead else ((z, extra, a), (extra, a, b))
         for triple in triples:
             where = hidden_dips(*triple)[number]

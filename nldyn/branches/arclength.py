@@ -10,10 +10,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import TINY, Real
 from nldyn.base.errors import FAILURES, ConvergenceError, check_types
 from nldyn.base.rows import Rows
-from nldyn.bifurcations.beyond_rigid_grazing import SLIGHTEST
+from nldyn.bifurcations.beyond_rigid_grazing import DIFFERENCED, SLIGHTEST
 from nldyn.bifurcations.branch_crossing import (
     ON_CROSSING,
     SHORTEST_CROSSING,
@@ -22,14 +22,14 @@ from nldyn.bifurcations.branch_crossing import (
     lies_on_crossing,
 )
 from nldyn.bifurcations.period_doubling import flip_between, half_difference, passed_flip
-from nldyn.bifurcations.point import BranchNode
+from nldyn.bifurcations.point import BranchNode, place_of
 from nldyn.bifurcations.sign_changes import crosses
 from nldyn.bifurcations.touching import rigid_grazing, rigid_touches
 from nldyn.bifurcations.within_step import differs, passes_node
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.predictor import predicted
 from nldyn.branches.step_control import ContinuationOptions
-from nldyn.orbits.bordered import Free, OrbitFamily, correct, length_unit
+from nldyn.orbits.bordered import FREE, OrbitFamily, correct, length_unit
 from nldyn.orbits.conditions import TOUCH, depth_row
 from nldyn.orbits.impact_phases import (
     impact_behind_node,
@@ -40,7 +40,6 @@ from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import (
     BROKEN,
     FROM_NEAR,
-    ShootingProblem,
     asymmetry,
     metric_length,
     shifts,
@@ -66,6 +65,7 @@ ROOM = 1.1  # times a bound: what is searched, where the bound itself is looked 
 FARTHEST_OFF = 0.75  # of the largest angle: how far, over the step, a point may lie off the tangent
 NEAR_CROSSING = 0.1  # of the step: a crossing as near as this to its end is passed by another step
 BESIDE_RESONANCE = 1e-6  # relative distance from one, where steps are lost in rounding
+SCALES = 1e-8  # relative departure from a proportional change that is rounding
 BESIDE_STEP = 0.01  # squared distance from a step, over its own, of what it passes through
 
 
@@ -80,7 +80,7 @@ class StepperState:
     step : float
         Arclength of the next step.
     behind : (2m, N + 1)
-        Shooting unknowns and tangent of the points before, the last one first; no rows at the
+        Unknowns and tangent of the points before, the last one first; no rows at the
         start.
     count : int
         Steps made.
@@ -94,16 +94,14 @@ class StepperState:
 
 def grazes_rigid(
     orbit: Orbit, least: float, most: float, but: Callable[[int, float], bool] | None = None
-) -> StopReason | None:
-    """The reason to stop, if an impact with a rigid stop, or a near miss, is so deep.
+) -> bool:
+    """Whether an impact with a rigid stop, or a near miss, is so deep.
 
     Both bounds are shares of the orbit's size; `but` is as for `rigid_grazing`.
     """
     unit, touches = length_unit(orbit), rigid_touches(orbit)
     slight = [each[:2] for each in touches if least < each[2] / unit < most]
-    if not slight or (but is not None and all(but(*each) for each in slight)):
-        return None
-    return Ending.GRAZES_RIGID.told(hz=f"{orbit.frequency_hz:.9g}")
+    return bool(slight) and (but is None or not all(but(*each) for each in slight))
 
 
 def loses_impact(orbit: Orbit) -> bool:
@@ -138,26 +136,26 @@ def _past_impact_at_node(
     made with the states at other phases, the first of `steps` that leads on by no more than an
     angle. The phase must be as near as told.
     """
-    orbit, problem = here.orbit, here.orbit.problem
+    orbit, plain = here.orbit, here.family
     before = impact_behind_node(orbit)
     if abs(before) > near:
         return None
-    family = replace(OrbitFamily.in_frequency(orbit), start=start_far_from_impacts(orbit))
-    by_frequency = np.zeros(orbit.point.size)
-    by_frequency[-1] = math.copysign(1.0, here.tangent[-1])
+    family = plain.shot_from(start_far_from_impacts(orbit))
+    by_parameter = np.zeros(here.point.size)
+    by_parameter[-1] = math.copysign(1.0, here.tangent[-1])
     try:
         begin = family.unknowns(orbit)
-        first = correct(family, begin, Free(), np.abs(by_frequency), float(begin[-1]))
+        first = correct(family, begin, FREE, np.abs(by_parameter))
         if not first.converged:
             return None
-        weights = family.metric(first.at.point)
-        direction = _unit(first.along, weights, by_frequency)
+        weights = family.metric(first.point)
+        direction = _unit(first.along, weights, by_parameter)
         row = weights * direction
         row /= np.linalg.norm(row)
         for step in steps:
-            straight = first.at.point + step * direction
-            met = correct(family, straight, Free(), row, float(row @ straight))
-            off = metric_length(weights, met.at.point - straight)
+            straight = first.point + step * direction
+            met = correct(family, straight, FREE, row)
+            off = metric_length(weights, met.point - straight)
             if not met.converged or off > FARTHEST_OFF * max_angle * step:
                 continue
             way = _unit(met.along, weights, weights * direction)
@@ -166,16 +164,18 @@ def _past_impact_at_node(
             stays = (impacts_by_segment(met.orbit) == impacts_by_segment(orbit)).all()
             if abs(behind) < AT_NODE or (stays and abs(before) > AT_NODE and before * behind > 0.0):
                 continue
-            by_frequency[-1] = math.copysign(1.0, way[-1])
-            found = problem.correct(
-                met.orbit.point, by_frequency, longest=NEAR_NODE, max_iterations=FROM_NEAR
+            by_parameter[-1] = math.copysign(1.0, way[-1])
+            guess = plain.unknowns(met.orbit)
+            guess[-1] = met.point[-1]
+            found = correct(
+                plain, guess, FREE, by_parameter, longest=NEAR_NODE, max_iterations=FROM_NEAR
             )
             if angle > max_angle or not found.converged:
                 continue
-            other = Orbit.of(problem, found, orbit.observe)
+            other = found.orbit
             if loses_impact(other) or grazing_between(orbit, other):
                 continue
-            there = BranchNode(other, problem.tangent(found, by_frequency), here.arclength + step)
+            there = BranchNode.of(found, found.tangent(by_parameter), here.arclength + step)
             if other.impacts == orbit.impacts and not differs(here, there):
                 return there, angle, 0.0
     except FAILURES:
@@ -200,8 +200,8 @@ class Stepper:
     ----------
     start : BranchNode
         First point, yielded first; its tangent gives the direction.
-    range_hz : (float, float)
-        Frequencies between which to stay.
+    limits : (float, float)
+        Values of the parameter between which to stay.
     options : ContinuationOptions
         Step control.
     open_ends : (m, N + 1) array, optional
@@ -213,7 +213,7 @@ class Stepper:
     """
 
     start: BranchNode
-    range_hz: tuple[float, float]
+    limits: tuple[float, float]
     options: ContinuationOptions
     open_ends: Real | None = None
     stop_reason: StopReason = field(default_factory=Ending.NOT_FINISHED.told)
@@ -222,6 +222,7 @@ class Stepper:
     _places: Rows | None = field(default=None, init=False, repr=False)  # unknowns of these
     _obstacle: str = field(default="", init=False, repr=False)
     _depth_row: tuple[BranchNode, Real | None] | None = field(default=None, init=False, repr=False)
+    _last: list[BranchNode] | None = field(default=None, init=False, repr=False)
     _met: float = field(default=0.0, init=False, repr=False)  # last step too long to meet a flip
 
     def __post_init__(self) -> None:
@@ -229,48 +230,54 @@ class Stepper:
 
     def __iter__(self) -> Iterator[BranchNode]:
         """Walk along the branch."""
-        problem = self.start.orbit.problem
         if self.stride is None:
             behind = np.empty((0, self.start.tangent.size))
             self.stride = StepperState(self.start, self.options.first_step, behind, 0)
             yield self.start
         while self.stride.count < self.options.max_points:
             here, step, behind = self.stride.here, self.stride.step, self.stride.behind
-            attempt = self._shortened(problem, behind, here, step)
+            rest = self._scaled_to_rest(here, behind)
+            if rest is not None:
+                parameter = here.parameter.name
+                self.stop_reason = Ending.SCALES_TO_REST.told(parameter=parameter)
+                yield rest
+                return
+            attempt = self._shortened(behind, here, step)
+            if attempt is None and self._last is not None:
+                self.stop_reason = self._at_range_end()
+                yield from self._last
+                return
             if attempt is None:
                 grazes = grazes_rigid(here.orbit, -GRAZES, GRAZES)
-                self.stop_reason = grazes or self.too_short()
+                self.stop_reason = _at_grazing(here) if grazes else self.too_short()
                 return
             step, point, angle, miss = attempt
-            low, high = self.range_hz
-            if not low <= point.orbit.frequency_hz <= high:
-                end = self._range_end(here, point, low if point.orbit.frequency_hz < low else high)
+            low, high = self.limits
+            if not low <= point.value <= high:
+                end = self._range_end(here, point, low if point.value < low else high)
                 half_step = 0.5 * step
                 passed = end is not None and grazing_between(here.orbit, end.orbit)
                 if passed and half_step >= self.options.min_step:  # behind the end may be rest
                     self.stride = replace(self.stride, step=half_step)
                     continue
-                self.stop_reason = Ending.RANGE_END.told()
+                self.stop_reason = self._at_range_end()
                 if end is not None:
                     yield end
                 return
-            if passed_flip(here.orbit, point.orbit):
-                half = problem.period // 2
+            if passed_flip(here, point):
+                half = here.family.period // 2
                 try:
                     end = flip_between(here, point)
                 except ConvergenceError:
                     self.stop_reason = Ending.MEETS_HALF_PERIOD.told(
-                        period=half, hz=f"{here.orbit.frequency_hz:.6g}"
+                        period=half, place=place_of(here)
                     )
                     return
-                self.stop_reason = Ending.JOINS.told(
-                    period=half, hz=f"{end.orbit.frequency_hz:.6g}"
-                )
+                self.stop_reason = Ending.JOINS.told(period=half, place=place_of(end))
                 yield end
                 return
-            grazes = grazes_rigid(point.orbit, 0.0, SLIGHTEST)
-            if grazes:
-                self.stop_reason = grazes
+            if grazes_rigid(point.orbit, 0.0, self._slightest):
+                self.stop_reason = _at_grazing(point)
                 yield point
                 return
             if self.closes(here, point):
@@ -278,7 +285,7 @@ class Stepper:
                 yield point
                 return
             if self.stride.count % LOOKS_BACK == 0 and self._comes_back(here, point):
-                self.stop_reason = Ending.COMES_BACK.told(hz=f"{here.orbit.frequency_hz:.6g}")
+                self.stop_reason = Ending.COMES_BACK.told(place=place_of(here))
                 return
             if self.open_ends is not None and _passed(here, point, self.open_ends).any():
                 self.stop_reason = Ending.MEETS_OPEN_END.told()
@@ -289,19 +296,29 @@ class Stepper:
             )
             bent = bent or passes_node(here, point)
             step = self.options.next_step(step, angle, miss)
-            trail = np.vstack([here.orbit.point, here.tangent, behind])
+            trail = np.vstack([here.point, here.tangent, behind])
             behind = trail[: 0 if bent else 2 * MOST_BEHIND]
             self.stride = StepperState(point, step, behind, self.stride.count + 1)
             self.visited.append(point)
             yield point
         self.stop_reason = Ending.MOST_POINTS.told(points=self.options.max_points)
 
+    @cached_property
+    def _slightest(self) -> float:
+        """Slightest impact with a rigid stop that is followed, its depth over the orbit's size."""
+        return SLIGHTEST if self.start.family.is_exact else DIFFERENCED
+
+    def _at_range_end(self) -> StopReason:
+        if self.start.family.in_frequency_alone:
+            return Ending.RANGE_END.told()
+        return Ending.PARAMETER_RANGE_END.told(parameter=self.start.parameter.name)
+
     def too_short(self) -> StopReason:
         """The reason to stop where no step leads on."""
         if self.stride is not None:
             resonance = _resonance_beside(self.stride.here.orbit)
             if resonance is not None:
-                return Ending.GROWS.told(hz=f"{resonance:.9g}")
+                return Ending.GROWS.told(place=f"{resonance:.9g} Hz")
         return Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
 
     def begin_anew(self, here: BranchNode, step: float) -> None:
@@ -312,23 +329,26 @@ class Stepper:
         self.visited.append(here)
 
     def _shortened(
-        self, problem: ShootingProblem, behind: Real, here: BranchNode, step: float
+        self, behind: Real, here: BranchNode, step: float
     ) -> tuple[float, BranchNode, float, float] | None:
         """The longest step up to `step` that leads to a next point, with what `_advance` gives."""
-        tried = False
+        tried, jumps = False, here.orbit.system.jumps
         while step >= self.options.min_step:
-            attempt = self._advance(problem, behind, here, step)
+            attempt = self._advance(behind, here, step)
             if attempt is None and step <= KINK:
-                attempt = self._across_touch(problem, here, step)
-            elif attempt is None and problem.flow.system.jumps:
+                attempt = self._across_touch(here, step)
+            elif attempt is None and jumps:
                 attempt = _past_impact_at_node(
                     here, (step,), min(FARTHEST_NODE, FASTEST * step), self.options.max_angle
                 )
             if attempt is None and step <= MEETING_STEP and self._met == 2.0 * step:
                 step, self._met = self._met, 0.0  # shorter, it ends too near to the flip
-                attempt = self._advance(problem, behind, here, step, step)
+                attempt = self._advance(behind, here, step, step)
             if attempt is not None:
                 return step, *attempt
+            self._last = self._limit_ahead(here, step)
+            if self._last is not None:
+                return None
             step *= 0.5
             if not tried and self.options.min_step <= step < SHORTEST_CROSSING:
                 tried = True
@@ -339,28 +359,26 @@ class Stepper:
         return None
 
     def _advance(
-        self,
-        problem: ShootingProblem,
-        behind: Real,
-        here: BranchNode,
-        step: float,
-        crossing: float = 0.0,
+        self, behind: Real, here: BranchNode, step: float, crossing: float = 0.0
     ) -> tuple[BranchNode, float, float] | None:
         """Next point, its angle to this one and its relative distance from the predictor.
 
         None when the step must be shorter, as it must be to cross another branch or to meet it:
         up to `SHORTEST_CROSSING` or `MEETING_STEP`, or `crossing` if that is longer.
         """
-        weights = problem.metric(here.orbit.point)
+        family = here.family
+        weights = family.metric(here.point)
         direction = here.tangent / metric_length(weights, here.tangent)
-        straight = here.orbit.point + step * direction
+        straight = here.point + step * direction
         row = weights * direction
         row /= math.sqrt(float(row @ row))
-        cubic, guess = predicted(here.orbit.point, here.tangent, behind, weights, step)
-        found = problem.correct(
+        cubic, guess = predicted(here.point, here.tangent, behind, weights, step)
+        found = correct(
+            family,
             guess,
+            FREE,
             row,
-            offset=float(row @ straight),
+            float(row @ straight),
             longest=ROOM * self.options.max_miss * step if step > KINK else 2.0 * step,
             max_iterations=FROM_NEAR,
             like=here.orbit.motion,
@@ -371,13 +389,13 @@ class Stepper:
         )
         if not found.converged:
             self._obstacle = found.failure
-            if found.last_step < math.inf:
-                self._obstacle += f", last relative step {found.last_step:.1e}"
+            if found.solution is not None and found.step < math.inf:
+                self._obstacle += f", last relative step {found.step:.1e}"
             return None
         self._obstacle = "what Newton's method finds is not the next point of the branch"
-        if _jumped(problem, here.orbit.point, straight, found.point):
+        if _jumped(family, here.point, straight, found.point):
             return None
-        orbit = Orbit.of(problem, found, here.orbit.observe)
+        orbit = found.orbit
         if loses_impact(orbit) or grazing_between(here.orbit, orbit):
             return None
         miss = metric_length(weights, found.point - cubic) / step
@@ -386,9 +404,9 @@ class Stepper:
         if step <= KINK and miss < 1.0:
             if orbit.impacts != here.orbit.impacts and grazes_rigid(here.orbit, -GRAZES, GRAZES):
                 return None  # the branch with the impact and that without meet in a corner
-            if problem.flow.system.jumps or orbit.impacts != here.orbit.impacts:
-                tangent = problem.tangent(found, direction)
-                return BranchNode(orbit, tangent, here.arclength + step), 0.0, 0.0
+            if orbit.system.jumps or orbit.impacts != here.orbit.impacts:
+                tangent = found.tangent(direction)
+                return BranchNode.of(found, tangent, here.arclength + step), 0.0, 0.0
         if miss > self.options.max_miss:
             return None
         # a curve that turns by max_angle leaves its tangent by half of that: a longer correction
@@ -396,25 +414,25 @@ class Stepper:
         off = metric_length(weights, found.point - straight)
         if off > FARTHEST_OFF * self.options.max_angle * step:
             return None
-        tangent = problem.tangent(found, direction)
+        tangent = found.tangent(direction)
         cosine = float(direction @ (weights * tangent)) / metric_length(weights, tangent)
         angle = math.acos(min(max(cosine, -1.0), 1.0))
         if angle > self.options.max_angle:
             return None
         if step > self.options.grazing_step and orbit.impacts != here.orbit.impacts:
             return None
-        meets = passed_flip(here.orbit, orbit)
+        meets = passed_flip(here, found)
         if meets and step > max(MEETING_STEP, crossing):
             self._met = step
             return None
-        point = BranchNode(orbit, tangent, here.arclength + step)
+        point = BranchNode.of(found, tangent, here.arclength + step)
         if (
             not meets
             and crosses(here, point)
-            and (step > max(crossing, SHORTEST_CROSSING) or not is_crossing(orbit))
+            and (step > max(crossing, SHORTEST_CROSSING) or not is_crossing(found))
         ):
             return None
-        if lies_on_crossing(orbit, min(NEAR_CROSSING * step, ON_CROSSING)):
+        if lies_on_crossing(found, min(NEAR_CROSSING * step, ON_CROSSING)):
             return None
         return point, angle, miss
 
@@ -426,7 +444,7 @@ class Stepper:
         return orbit.impacts if step > self.options.grazing_step and not orbit.rests else -1
 
     def _across_touch(
-        self, problem: ShootingProblem, here: BranchNode, step: float
+        self, here: BranchNode, step: float
     ) -> tuple[BranchNode, float, float] | None:
         """Next point on the other side of a grazing point, as `_advance` gives it, or None.
 
@@ -435,23 +453,23 @@ class Stepper:
         held the stop's force hardly depends on the orbit.
         """
         if self._depth_row is None or self._depth_row[0] is not here:
-            self._depth_row = here, depth_row(here.orbit)
+            self._depth_row = here, depth_row(here)
         row = self._depth_row[1]
         if row is None:
             return None
-        weights = problem.metric(here.orbit.point)
-        guess = here.orbit.point + step * here.tangent / metric_length(weights, here.tangent)
-        found = problem.correct(guess, row, longest=2.0 * KINK, max_iterations=FROM_NEAR)
-        if not found.converged or _jumped(problem, here.orbit.point, guess, found.point):
+        family = here.family
+        weights = family.metric(here.point)
+        guess = here.point + step * here.tangent / metric_length(weights, here.tangent)
+        found = correct(family, guess, FREE, row, longest=2.0 * KINK, max_iterations=FROM_NEAR)
+        if not found.converged or _jumped(family, here.point, guess, found.point):
             return None
-        orbit = Orbit.of(problem, found, here.orbit.observe)
-        length = metric_length(weights, found.point - here.orbit.point)
-        if length > KINK or orbit.impacts == here.orbit.impacts:
+        length = metric_length(weights, found.point - here.point)
+        if length > KINK or found.orbit.impacts == here.orbit.impacts:
             return None
-        tangent = problem.tangent(found, here.tangent)
+        tangent = found.tangent(here.tangent)
         if float(row @ tangent) * float(row @ here.tangent) < 0.0:
             tangent = -tangent
-        return BranchNode(orbit, tangent, here.arclength + length), 0.0, 0.0
+        return BranchNode.of(found, tangent, here.arclength + length), 0.0, 0.0
 
     def _past_crossing(self, here: BranchNode) -> tuple[BranchNode, float, float] | None:
         """Next point from one beside which branches cross, or None.
@@ -462,36 +480,77 @@ class Stepper:
         crossing = _crossing_ahead(here)
         if crossing is None:
             return None
-        problem, obstacle = here.orbit.problem, self._obstacle
+        obstacle = self._obstacle
         back = max(here.arclength - crossing.arclength, 0.0)
         none = np.empty((0, crossing.tangent.size))
         for factor in LONGER_CROSSINGS:
             length = back + factor * SHORTEST_CROSSING
-            attempt = self._advance(problem, none, crossing, length, length)
+            attempt = self._advance(none, crossing, length, length)
             if attempt is not None:
                 return attempt
         self._obstacle = obstacle
         return None
 
-    def _range_end(self, a: BranchNode, b: BranchNode, end_hz: float) -> BranchNode | None:
+    def _range_end(self, a: BranchNode, b: BranchNode, end: float) -> BranchNode | None:
         """Point of the branch exactly at an end of the range."""
-        p = math.log(2.0 * math.pi * end_hz)
-        pa, pb = a.orbit.point[-1], b.orbit.point[-1]
+        p = a.family.charts[0].coordinate(end)
+        pa, pb = a.point[-1], b.point[-1]
         if pa == p:
             return None
         share = (p - pa) / (pb - pa)
-        problem = a.orbit.problem
-        guess = (1.0 - share) * a.orbit.point + share * b.orbit.point
+        guess = (1.0 - share) * a.point + share * b.point
         row = np.zeros(guess.size)
         row[-1] = 1.0
         guess[-1] = p
-        found = problem.correct(guess, row, like=a.orbit.motion)
+        found = correct(a.family, guess, FREE, row, like=a.orbit.motion)
         if not found.converged:
             return None
-        orbit = Orbit.of(problem, found, a.orbit.observe)
-        tangent = problem.tangent(found, a.tangent)
         length = a.arclength + share * (b.arclength - a.arclength)
-        return BranchNode(orbit, tangent, length)
+        return BranchNode.of(found, found.tangent(a.tangent), length)
+
+    def _scaled_to_rest(self, here: BranchNode, behind: Real) -> BranchNode | None:
+        """Rest, at the end of a range at zero to which orbits shrink in proportion, or None.
+
+        They would do so for ever on the scale of their own size.
+        """
+        chart = here.family.charts[0]
+        towards = chart.low == 0.0 == self.limits[0] and here.tangent[-1] < 0.0
+        if not (towards and len(behind)):
+            return None
+        if not (scales(behind[0], behind[1]) and scales(here.point, here.tangent)):
+            return None
+        row = np.zeros(here.point.size)
+        row[-1] = 1.0
+        found = correct(here.family, np.zeros(here.point.size), FREE, row)
+        if not found.converged:
+            return None
+        length = metric_length(here.family.metric(here.point), here.point)
+        return BranchNode.of(found, found.tangent(here.tangent), here.arclength + length)
+
+    def _limit_ahead(self, here: BranchNode, step: float) -> list[BranchNode] | None:
+        """The point at the end of the range, if a failed step would have passed it.
+
+        Behind the end of the range of a parameter there may be no systems: no restitution above 1,
+        no damping below zero. No point if the walk is there.
+        """
+        if here.family.in_frequency_alone:
+            return None
+        weights, slope = here.family.metric(here.point), float(here.tangent[-1])
+        limit = self.limits[slope > 0.0]
+        p = here.family.charts[0].coordinate(limit)
+        ahead = (p - float(here.point[-1])) / (slope or TINY)
+        if here.value == limit or not 0.0 < ahead <= step:
+            return [] if here.value == limit else None
+        straight = here.point + ahead * here.tangent
+        straight[-1] = p
+        row = np.zeros(straight.size)
+        row[-1] = 1.0
+        found = correct(here.family, straight, FREE, row)
+        off = metric_length(weights, found.point - straight)
+        if not found.converged or off > self.options.max_angle * ahead:
+            return None
+        end = BranchNode.of(found, found.tangent(here.tangent), here.arclength + ahead)
+        return None if grazing_between(here.orbit, end.orbit) else [end]
 
     def closes(self, a: BranchNode, b: BranchNode) -> bool:
         """Whether the walk from a to b passes the start again, in the same direction.
@@ -505,7 +564,7 @@ class Stepper:
         passed = _passed(a, b, places)
         if not passed.any():
             return False
-        step = start.orbit.problem.metric(start.orbit.point) * (b.orbit.point - a.orbit.point)
+        step = start.family.metric(start.point) * (b.point - a.point)
         return bool((tangents[passed] @ step > 0.0).any())
 
     def _comes_back(self, a: BranchNode, b: BranchNode) -> bool:
@@ -514,23 +573,21 @@ class Stepper:
         It can, in the same direction, only where it has left its branch for another one on the way.
         """
         if self._places is None:
-            self._places = Rows(a.orbit.point.size)
+            self._places = Rows(a.point.size)
         for point in self.visited[len(self._places.so_far()) :]:
-            self._places.add(point.orbit.point)
+            self._places.add(point.point)
         passed = _passed(a, b, self._places.so_far()[:-RECENT])
         if not passed.any():
             return False
-        problem = a.orbit.problem
-        weights, step = problem.metric(a.orbit.point), b.orbit.point - a.orbit.point
+        weights, step = a.family.metric(a.point), b.point - a.point
         length2 = float(step @ (weights * step))
         for index in np.flatnonzero(passed):
-            place, tangent = self.visited[index].orbit.point, self.visited[index].tangent
+            place, tangent = self.visited[index].point, self.visited[index].tangent
             if tangent @ (weights * step) <= 0.0:
                 continue
             row = weights * tangent / np.linalg.norm(weights * tangent)
-            share = float((place - a.orbit.point) @ (weights * step)) / length2
-            guess = a.orbit.point + share * step
-            found = problem.correct(guess, row, offset=float(row @ place))
+            share = float((place - a.point) @ (weights * step)) / length2
+            found = correct(a.family, a.point + share * step, FREE, row, float(row @ place))
             if found.converged and metric_length(weights, found.point - place) < SAME_PLACE:
                 return True
         return False
@@ -538,11 +595,18 @@ class Stepper:
     @cached_property
     def _shifts(self) -> tuple[Real, Real]:
         """Shooting unknowns and tangents of the start shifted by its excitation periods."""
-        problem = self.start.orbit.problem
-        return (
-            np.array(shifts(problem, self.start.orbit.point)),
-            np.array(shifts(problem, self.start.tangent)),
-        )
+        problem, start = self.start.family.problem, self.start
+        return np.array(shifts(problem, start.point)), np.array(shifts(problem, start.tangent))
+
+
+def _at_grazing(point: BranchNode) -> StopReason:
+    return Ending.GRAZES_RIGID.told(place=place_of(point, 9))
+
+
+def scales(point: Real, tangent: Real) -> bool:
+    """Whether the states of a branch in one parameter change in proportion to it."""
+    off = point[:-1] * tangent[-1] - tangent[:-1] * point[-1]
+    return bool(np.abs(off).max() < SCALES * np.abs(tangent[:-1]).max() * abs(point[-1]))
 
 
 def _resonance_beside(orbit: Orbit) -> float | None:
@@ -557,15 +621,15 @@ def _crossing_ahead(here: BranchNode) -> BranchNode | None:
 
     It may lie a little behind.
     """
-    crossing = crossing_beside(here.orbit)
+    crossing = crossing_beside(here)
     if crossing is None:
         return None
-    way = crossing.point - here.orbit.point
-    weights = here.orbit.problem.metric(here.orbit.point)
+    way = crossing.point - here.point
+    weights = here.family.metric(here.point)
     if metric_length(weights, way) > FARTHEST_CROSSING:
         return None
     ahead = float(way @ (weights * here.tangent)) / metric_length(weights, here.tangent)
-    return BranchNode(crossing, here.tangent, here.arclength + ahead)
+    return BranchNode.of(crossing, here.tangent, here.arclength + ahead)
 
 
 def _passed(a: BranchNode, b: BranchNode, places: Real) -> NDArray[np.bool_]:
@@ -575,8 +639,8 @@ def _passed(a: BranchNode, b: BranchNode, places: Real) -> NDArray[np.bool_]:
     """
     if passes_node(a, b):
         return np.zeros(len(places), dtype=bool)
-    start, step = a.orbit.point, b.orbit.point - a.orbit.point
-    weights = a.orbit.problem.metric(start)
+    start, step = a.point, b.point - a.point
+    weights = a.family.metric(start)
     length2 = float(step @ (weights * step))
     passed = np.zeros(len(places), dtype=bool)
     near = np.abs(places[:, -1] - start[-1]) <= ROOM * math.sqrt(length2)  # few are
@@ -589,7 +653,7 @@ def _passed(a: BranchNode, b: BranchNode, places: Real) -> NDArray[np.bool_]:
     return passed
 
 
-def _jumped(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> bool:
+def _jumped(family: OrbitFamily, here: Real, guess: Real, there: Real) -> bool:
     """Whether a step has landed on an orbit shifted by some excitation periods, or on half of one.
 
     Where it is shifted, some other shift of it lies nearer to where the step began. Only through a
@@ -597,6 +661,7 @@ def _jumped(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> b
     doubled branch go on along the one that it comes from, nor one of broken symmetry along the
     symmetric one.
     """
+    problem = family.problem
     broken = asymmetry(problem, here)
     least = max(BROKEN, BY_TOLERANCE * problem.flow.options.rtol)
     if broken > least and asymmetry(problem, there) < EQUAL_HALVES * broken:
@@ -610,7 +675,7 @@ def _jumped(problem: ShootingProblem, here: Real, guess: Real, there: Real) -> b
         return True
     if problem.period % 2:
         return False
-    a, g, b = (half_difference(problem, point) for point in (here, guess, there))
+    a, g, b = (half_difference(family, point) for point in (here, guess, there))
     before, after = float(np.linalg.norm(a)), float(np.linalg.norm(b))
     if after < EQUAL_HALVES * before:  # on the branch of half the period
         return True

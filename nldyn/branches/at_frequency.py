@@ -1,8 +1,7 @@
-"""Where a branch passes a frequency: all of its orbits there."""
+"""Where a branch passes a value of its parameter: all of its orbits there."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,13 +11,22 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import LocateError, SystemModelError, check_frequency, failing_as, shown
+from nldyn.base.errors import (
+    LocateError,
+    SystemModelError,
+    check_frequency,
+    failing_as,
+    is_finite,
+    shown,
+)
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.roots import root
+from nldyn.orbits.bordered import FREE, correct
 from nldyn.orbits.orbit import Orbit, same_orbit, stroboscopic
+from nldyn.system.chart import FREQUENCY, Chart, told_value
 
-SAME = 4e-15  # difference of two logarithms of a frequency that is rounding
+SAME = 4e-15  # difference of two coordinates (logarithms of a frequency) that is rounding
 NEARLY_SAME = 1e-12  # the same, of an orbit solved for and not held there
 BESIDE = 2.0  # an orbit further from a chord, in its lengths, is not on the branch between its ends
 SAME_STATE = 1e-5  # of its size: distance of states that are one
@@ -38,9 +46,9 @@ class Places:
     points: tuple[BranchNode, ...]
 
     @cached_property
-    def log_frequencies(self) -> Real:
-        """Logarithms of ω (rad/s)."""
-        return np.array([point.orbit.point[-1] for point in self.points])
+    def coordinates(self) -> Real:
+        """Coordinates of the parameter, ln ω for the frequency."""
+        return np.array([point.point[-1] for point in self.points])
 
     @cached_property
     def stroboscopic_states(self) -> Real:
@@ -48,8 +56,8 @@ class Places:
         return np.array([stroboscopic(point.orbit) for point in self.points])
 
 
-def crossings(places: Places, frequency_hz: float) -> list[BranchNode]:
-    """Points of a branch at one frequency, one for each passage, in order along the branch.
+def crossings(places: Places, value: float) -> list[BranchNode]:
+    """Points of a branch at one value of its parameter, one for each passage, in order along it.
 
     A passage lies between two neighbours among the computed and the special points, so that on
     either side of a fold there may be one.
@@ -57,9 +65,9 @@ def crossings(places: Places, frequency_hz: float) -> list[BranchNode]:
     Raises
     ------
     SystemModelError
-        If the frequency is not a positive number.
+        If the parameter cannot have this value.
     """
-    return _crossings(places, frequency_hz)[0]
+    return _crossings(places, value)[0]
 
 
 def passes(places: Places, orbit: Orbit) -> bool:
@@ -67,11 +75,14 @@ def passes(places: Places, orbit: Orbit) -> bool:
 
     The branch is solved for only where its chord comes near the orbit.
     """
-    p = float(orbit.point[-1])
+    family = places.points[0].family
+    p = float(family.unknowns(orbit)[-1])
+    if not family.holds(orbit):
+        return False
     on, passed = _passages(places, p)
     if any(same_orbit(places.points[i].orbit, orbit) for i in on):
         return True
-    for i in passed[_chords_beside(places, passed, orbit)]:
+    for i in passed[_chords_beside(places, passed, orbit, p)]:
         try:
             found = _crossing(places.points[i], places.points[i + 1], p)
         except LocateError:
@@ -81,9 +92,11 @@ def passes(places: Places, orbit: Orbit) -> bool:
     return False
 
 
-def _chords_beside(places: Places, first: NDArray[np.intp], orbit: Orbit) -> NDArray[np.bool_]:
+def _chords_beside(
+    places: Places, first: NDArray[np.intp], orbit: Orbit, p: float
+) -> NDArray[np.bool_]:
     """Which chords, given by the number of their first point, come near an orbit."""
-    level = places.log_frequencies - orbit.point[-1]
+    level = places.coordinates - p
     states, target = places.stroboscopic_states, stroboscopic(orbit)
     share = level[first] / (level[first] - level[first + 1])
     chords = states[first + 1] - states[first]
@@ -98,42 +111,54 @@ def _chords_beside(places: Places, first: NDArray[np.intp], orbit: Orbit) -> NDA
 
 
 def requested(places: Places, at: Sequence[float]) -> tuple[list[BranchNode], list[str]]:
-    """Points of a branch at some frequencies, in order along it.
+    """Points of a branch at some values of its parameter, in order along it.
 
     With notes on passages whose orbit was not found.
     """
     points: list[BranchNode] = []
     notes: list[str] = []
-    for frequency in at:
-        found, lost = _crossings(places, frequency)
+    for value in at:
+        found, lost = _crossings(places, value)
         points += found
         notes += lost
     return sorted(points, key=_arclength), notes
 
 
-def check_requested(at: Sequence[float], range_hz: tuple[float, float]) -> tuple[float, ...]:
-    """The requested frequencies, or a SystemModelError if one of them is outside of the range."""
+def check_requested(at: Sequence[float], chart: Chart) -> tuple[float, ...]:
+    """The requested values, or a SystemModelError if one of them is outside of the range."""
+    name = chart.parameter.name
+    name = "frequencies" if name == FREQUENCY else f"values of {name}"
     try:
         wanted = tuple(at)
     except TypeError:
-        raise SystemModelError(f"at must be a list of frequencies, got {shown(at)}") from None
-    low, high = range_hz
-    for frequency in wanted:
-        check_frequency("at: each frequency", frequency)
-        if not low <= frequency <= high:
+        raise SystemModelError(f"at must be a list of {name}, got {shown(at)}") from None
+    for value in wanted:
+        check_value("at: each value", chart, value)
+        if not chart.low <= value <= chart.high:
+            place = told_value(chart.parameter, value)
             raise SystemModelError(
-                f"at: {frequency:g} Hz lies outside range_hz = ({low:g}, {high:g})"
+                f"at: {place} lies outside {chart.range_name} = ({chart.low:g}, {chart.high:g})"
             )
-    return tuple(float(frequency) for frequency in wanted)
+    return tuple(float(value) for value in wanted)
+
+
+def check_value(name: str, chart: Chart, value: float) -> None:
+    """Refuse what is no value that a parameter can be followed to."""
+    if chart.parameter.name == FREQUENCY:
+        check_frequency(name.replace("value", "frequency"), value)
+    elif not is_finite(value) or (chart.logarithmic and value <= 0.0):
+        positive = "positive and " if chart.logarithmic else ""
+        raise SystemModelError(f"{name} must be {positive}finite, got {shown(value)}")
 
 
 def _arclength(point: BranchNode) -> float:
     return point.arclength
 
 
-def _crossings(places: Places, frequency_hz: float) -> tuple[list[BranchNode], list[str]]:
-    check_frequency("frequency_hz", frequency_hz)
-    p = math.log(2.0 * math.pi * frequency_hz)
+def _crossings(places: Places, value: float) -> tuple[list[BranchNode], list[str]]:
+    chart = places.points[0].family.charts[0]
+    check_value("frequency_hz" if chart.parameter.name == FREQUENCY else "value", chart, value)
+    p = chart.coordinate(value)
     on, passed = _passages(places, p)
     points, exact = places.points, set(on.tolist())
     found: list[BranchNode] = []
@@ -145,29 +170,26 @@ def _crossings(places: Places, frequency_hz: float) -> tuple[list[BranchNode], l
         try:
             found.append(_crossing(points[i], points[i + 1], p))
         except LocateError as error:
-            lost.append(f"the orbit of the branch at {frequency_hz:.8g} Hz is missing: {error}")
+            place = told_value(chart.parameter, value, digits=8)
+            lost.append(f"the orbit of the branch at {place} is missing: {error}")
     return found, lost
 
 
 def _passages(places: Places, p: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Numbers of the places at ln ω = p, and of those between which and the next one it lies."""
-    level = places.log_frequencies - p
+    """Numbers of the places at a coordinate p, and of those between which and the next it lies."""
+    level = places.coordinates - p
     on = np.abs(level) <= SAME
     passed = (level[:-1] * level[1:] < 0.0) & ~on[:-1] & ~on[1:]
     return np.flatnonzero(on), np.flatnonzero(passed)
 
 
-def _log_frequency(point: BranchNode) -> float:
-    return float(point.orbit.point[-1])
-
-
 @failing_as(LocateError)
 def _crossing(a: BranchNode, b: BranchNode, p: float) -> BranchNode:
-    """Point between two neighbours with ln ω = p.
+    """Point between two neighbours at a coordinate p.
 
-    Beside a fold Newton's method at a fixed frequency may miss; then the point is first located
+    Beside a fold Newton's method at a fixed value may miss; then the point is first located
     along the branch. Very near to the end of a doubled branch it misses from there too, as rounding
-    makes its steps; then the point located is the answer, whose ln ω is p to 1e-12.
+    makes its steps; then the point located is the answer, whose coordinate is p to 1e-12.
 
     Raises
     ------
@@ -179,31 +201,29 @@ def _crossing(a: BranchNode, b: BranchNode, p: float) -> BranchNode:
     try:
         return _held(chord, sigma, chord.between(sigma), p)
     except LocateError:
-        sigma, _ = root(lambda x: _log_frequency(chord.at(x)) - p)
+        sigma, _ = root(lambda x: float(chord.at(x).point[-1]) - p)
         point = chord.at(sigma)
         try:
-            return _held(chord, sigma, point.orbit.point, p)
+            return _held(chord, sigma, point.point, p)
         except LocateError:
-            if abs(_log_frequency(point) - p) > NEARLY_SAME:
+            if abs(float(point.point[-1]) - p) > NEARLY_SAME:
                 raise
             return point
 
 
 def _held(chord: Chord, sigma: float, guess: Real, p: float) -> BranchNode:
-    """Point of the branch at a fixed frequency, near a guess at σ of a chord."""
+    """Point of the branch at a fixed coordinate, near a guess at σ of a chord."""
     a, b = chord.first, chord.last
-    problem = a.orbit.problem
     start = np.append(guess[:-1], p)
     row = np.zeros(start.size)
     row[-1] = 1.0
-    found = problem.correct(start, row)
+    found = correct(a.family, start, FREE, row)
     if not found.converged:
         raise LocateError(found.failure)
-    secant = b.orbit.point - a.orbit.point
-    weights = problem.metric(a.orbit.point)
+    secant = b.point - a.point
+    weights = a.family.metric(a.point)
     off = found.point - start
     if float(off @ (weights * off)) > LEFT * float(secant @ (weights * secant)):
         raise LocateError("Newton's method left the branch")
     length = a.arclength + sigma * (b.arclength - a.arclength)
-    orbit = Orbit.of(problem, found, a.orbit.observe)
-    return BranchNode(orbit, problem.tangent(found, secant), length)
+    return BranchNode.of(found, found.tangent(secant), length)

@@ -18,6 +18,8 @@ from nldyn.branches.at_frequency import Places, crossings, passes
 from nldyn.branches.endings import Ending, StopReasons, has_ending
 from nldyn.branches.tables import Part, point_columns, special_columns, to_pandas, to_xarray
 from nldyn.orbits.orbit import Orbit, same_orbit
+from nldyn.system.chart import FREQUENCY, label_of, parameter_name, told_value
+from nldyn.system.parameters import Parameter
 
 if TYPE_CHECKING:
     import pandas
@@ -51,7 +53,7 @@ class WalkEnd:
     step : float
         Arclength of the next step.
     behind : (2m, N + 1)
-        Shooting unknowns and tangent of the points before the one to go on from, the last one
+        Unknowns and tangent of the points before the one to go on from, the last one
         first; no rows at a start.
     count : int
         Steps made.
@@ -78,14 +80,14 @@ class Course:
 
     Parameters
     ----------
-    range_hz : (float, float)
-        Frequencies between which to stay.
+    limits : (float, float)
+        Values of the parameter between which to stay.
     options : ContinuationOptions
         Step control.
     open_ends : (m, N + 1) array
         Where other branches were broken off.
     at : sequence of float
-        Frequencies in Hz at which orbits were requested.
+        Values at which orbits were requested.
     start : int
         Point at which the continuation started; it went forward, then backward.
     special_points_before, notes_before : int
@@ -94,7 +96,7 @@ class Course:
         How the ways backward and forward would go on; None for a way that there is not.
     """
 
-    range_hz: tuple[float, float]
+    limits: tuple[float, float]
     options: ContinuationOptions
     open_ends: Real
     at: Sequence[float] = ()
@@ -106,7 +108,7 @@ class Course:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Branch:
-    """A curve of periodic orbits of one period multiple.
+    """A curve of periodic orbits of one period multiple, in the frequency or another parameter.
 
     Parameters
     ----------
@@ -123,7 +125,7 @@ class Branch:
     notes : tuple of str
         What may be missing.
     requested : tuple of BranchNode
-        Points at the requested frequencies, in order along the branch.
+        Points at the requested values, in order along the branch.
     course : Course, optional
         How it was continued.
     """
@@ -139,17 +141,34 @@ class Branch:
 
     def __repr__(self) -> str:
         """One line, in place of all numbers of all orbits."""
-        hz = [node.orbit.frequency_hz for node in self.nodes]
+        values = self.values
+        span = told_value(self.parameter, float(values.min()), float(values.max()))
         return (
-            f"<Branch '{self.name}': period {self.period}, {len(hz)} points from {min(hz):.6g} to "
-            f"{max(hz):.6g} Hz, {len(self.special_points)} special points; {self.stop_reason}>"
+            f"<Branch '{self.name}': period {self.period}, {len(values)} points from "
+            f"{span.replace(' and ', ' to ')}, {len(self.special_points)} special points; "
+            f"{self.stop_reason}>"
         )
 
     def _repr_html_(self) -> str:
         """The special points, a row each."""
-        rows = [(s.kind, f"{s.frequency_hz:.9g}", f"{s.frequency_error:.1g}")
-                for s in self.special_points]  # fmt: skip
-        return html_table(repr(self), ("kind", "frequency (Hz)", "relative error"), rows)
+        rows = [(s.kind, f"{s.value:.9g}", f"{s.error:.1g}") for s in self.special_points]
+        return html_table(repr(self), ("kind", label_of(self.parameter), "relative error"), rows)
+
+    @property
+    def parameter(self) -> Parameter:
+        """What changes along the branch."""
+        return self.nodes[0].parameter
+
+    @property
+    def values(self) -> Real:
+        """Values of the parameter at the points."""
+        return np.array([node.value for node in self.nodes])
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Lowest and highest value of the parameter, also of the special points."""
+        reached = [place.value for place in self.places.points]
+        return min(reached), max(reached)
 
     @property
     def points(self) -> list[Orbit]:
@@ -193,14 +212,15 @@ class Branch:
         points = [*self.nodes, *(special.point for special in self.special_points)]
         return Places(tuple(sorted(points, key=lambda point: point.arclength)))
 
-    def at(self, frequency_hz: float) -> list[Orbit]:
-        """All orbits of the branch at one frequency, in order along it.
+    def at(self, value: float) -> list[Orbit]:
+        """All orbits of the branch at one value of its parameter, in order along it.
 
         Parameters
         ----------
-        frequency_hz : float
-            In Hz; that of the orbits differs from it by the rounding error of its logarithm only,
-            very near to the end of a doubled branch by up to 1e-12 of it.
+        value : float
+            A frequency in Hz, or in the parameter's unit; that of the orbits differs from it by the
+            rounding error of its logarithm only, very near to the end of a doubled branch by up to
+            1e-12 of it.
 
         Returns
         -------
@@ -211,7 +231,7 @@ class Branch:
         Raises
         ------
         SystemModelError
-            If the frequency is not a positive number.
+            If the parameter cannot have this value.
 
         Examples
         --------
@@ -223,7 +243,7 @@ class Branch:
         [12.5]
         """
         found: list[Orbit] = []
-        for point in crossings(self.places, frequency_hz):
+        for point in crossings(self.places, value):
             if not any(same_orbit(point.orbit, other) for other in found):
                 found.append(point.orbit)
         return found
@@ -240,7 +260,8 @@ class Branch:
         Returns
         -------
         dict of str to (n,) array
-            Units stand in the names; `largest_multiplier` is a modulus, `error` relative.
+            Units stand in the names, but for those of a parameter that is not the frequency: its
+            values stand first, in SI units. `largest_multiplier` is a modulus, `error` relative.
 
         Raises
         ------
@@ -249,10 +270,13 @@ class Branch:
         """
         check_choice("table: part", part, get_args(Part))
         course = self.course
-        known = (*course.range_hz, *course.at) if course else ()
+        known = (*course.limits, *course.at) if course else ()
         columns = point_columns(self._part(part), known)
+        if self.parameter.name != FREQUENCY:
+            values = [node.value for node in self._part(part)]
+            columns = {parameter_name(self.parameter): np.array(values, dtype=float), **columns}
         if part == "special_points":
-            return special_columns(self.special_points, columns)
+            return special_columns(self.special_points, columns, self.parameter)
         return columns
 
     def _part(self, part: Part) -> Sequence[BranchNode]:

@@ -8,14 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from nldyn.base.errors import (
-    FAILURES,
-    LocateError,
-    SystemModelError,
-    check_range,
-    check_types,
-    check_whole,
-)
+from nldyn.base.errors import FAILURES, LocateError, SystemModelError, check_types, check_whole
 from nldyn.bifurcations.normal_form_coefficients import (
     Estimate,
     doubled_parameter,
@@ -23,13 +16,14 @@ from nldyn.bifurcations.normal_form_coefficients import (
     loop_of,
 )
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special, is_at
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special, is_at, on_branch
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.branches.continuation import make_branch
 from nldyn.branches.endings import Ending
 from nldyn.branches.step_control import ContinuationOptions
+from nldyn.system.chart import BOUNDS, Chart, told_value
 
 FEIGENBAUM = 4.669201609102991  # limit of the ratios, Feigenbaum (1978)
 POINTS_BETWEEN = 8  # of a doubled branch up to its flip, if that lies where it is expected
@@ -56,12 +50,13 @@ class Cascade:
 
     def __repr__(self) -> str:
         """One line: the flips and why there are no more."""
-        hz = ", ".join(f"{flip.frequency_hz:.8g}" for flip in self.flips) or "none"
-        return f"<Cascade of flips at {hz} Hz; {self.stop_reason}>"
+        values = [flip.value for flip in self.flips]
+        places = told_value(self.flips[0].point.parameter, *values, digits=8) if values else "none"
+        return f"<Cascade of flips at {places.replace(' and ', ', ')}; {self.stop_reason}>"
 
     @property
     def ratios(self) -> list[Estimate]:
-        r"""Ratios :math:`\delta_n = (f_n - f_{n-1}) / (f_{n+1} - f_n)` with their errors.
+        r"""Ratios :math:`\delta_n = (p_n - p_{n-1}) / (p_{n+1} - p_n)` with their errors.
 
         They tend to 4.669 [Feigenbaum 1978], and do so once the damping over the doubled period is
         strong: as long as the determinant of the monodromy matrix is near 1 they stay near 8.72,
@@ -70,28 +65,24 @@ class Cascade:
         found = []
         for n in range(1, len(self.flips) - 1):
             before, here, after = self.flips[n - 1 : n + 2]
-            gap, next_gap = here.frequency_hz - before.frequency_hz, after.frequency_hz
-            next_gap -= here.frequency_hz
-            errors = [s.frequency_error * s.frequency_hz for s in (before, here, after)]
+            gap, next_gap = here.value - before.value, after.value - here.value
+            errors = [s.value_error for s in (before, here, after)]
             share = (errors[0] + errors[1]) / abs(gap) + (errors[1] + errors[2]) / abs(next_gap)
             found.append(Estimate(gap / next_gap, abs(gap / next_gap) * share))
         return found
 
     @property
-    def limit_hz(self) -> float:
+    def limit(self) -> float:
         """Where the cascade accumulates if the last ratio stayed; nan before there is one."""
         if not self.ratios:
             return math.nan
         ratio = self.ratios[-1].value
-        last = self.flips[-1].frequency_hz
-        return last + (last - self.flips[-2].frequency_hz) / (ratio - 1.0)
+        last = self.flips[-1].value
+        return last + (last - self.flips[-2].value) / (ratio - 1.0)
 
     def describe(self) -> str:
         """Say in a few lines where the flips are and what their ratios are."""
-        lines = [
-            f"{s.orbit.period} -> {2 * s.orbit.period} at {s.frequency_hz:.9g} Hz"
-            for s in self.flips
-        ]
+        lines = [f"{s.orbit.period} -> {2 * s.orbit.period} at {s.place(9)}" for s in self.flips]
         if self.ratios:
             ratios = ", ".join(f"{ratio.value:.4g}" for ratio in self.ratios)
             lines.append(f"ratios {ratios} (they tend to 4.669)")
@@ -102,7 +93,7 @@ def cascade(
     first: SpecialPoint,
     depth: int = 4,
     *,
-    range_hz: tuple[float, float] | None = None,
+    limits: tuple[float, float] | None = None,
     options: ContinuationOptions | None = None,
 ) -> Cascade:
     """Follow a period-doubling cascade from its first flip.
@@ -117,8 +108,9 @@ def cascade(
         A flip (PD).
     depth : int
         How many further flips to look for.
-    range_hz : (float, float), optional
-        Frequencies within which to stay; from half to twice that of the flip unless given.
+    limits : (float, float), optional
+        Values of the branch's parameter within which to stay; from half to twice that of the flip
+        unless given, or those of its branch where the parameter may be negative.
     options : ContinuationOptions, optional
         Step control; the steps become shorter with every doubling.
 
@@ -148,12 +140,14 @@ def cascade(
     check_special("cascade", first, "PD", of_branch=False)
     check_types(options=(options, ContinuationOptions, None))
     check_whole("cascade: depth", depth, 1, 30)
-    hz = first.frequency_hz
-    window = check_range((0.5 * hz, 2.0 * hz) if range_hz is None else range_hz)
-    if not window[0] < hz < window[1]:
+    first = on_branch(first)
+    chart = _window(first, limits)
+    if not chart.low < first.value < chart.high:
         raise SystemModelError(
-            f"the flip at {hz:g} Hz lies outside range_hz = ({window[0]:g}, {window[1]:g})"
+            f"the flip at {first.place()} lies outside {chart.range_name} = ({chart.low:g}, "
+            f"{chart.high:g})"
         )
+    window = chart.low, chart.high
     flips, branches, reason = [first], list[Branch](), f"depth {depth} reached"
     for _ in range(depth):
         try:
@@ -167,6 +161,17 @@ def cascade(
             break
         flips.append(following)
     return Cascade(tuple(flips), tuple(branches), reason)
+
+
+def _window(first: SpecialPoint, limits: tuple[float, float] | None) -> Chart:
+    """The chart of the branch of a flip over a range."""
+    chart = first.point.family.charts[0]
+    if limits is not None:
+        return chart.over(limits)
+    if not chart.logarithmic:
+        return chart
+    least, most = BOUNDS.get(chart.parameter.name, (0.0, math.inf))
+    return chart.over((max(0.5 * first.value, least), min(2.0 * first.value, most)))
 
 
 def cascades_in(branches: Sequence[Branch]) -> list[Cascade]:
@@ -242,7 +247,7 @@ def _up_to_flip(
         if following is not None:
             break
     reason = walk.stop_reason if following is None else Ending.FLIP.told()
-    first = Ending.BEGINS_AT_FLIP.told(hz=f"{flips[-1].frequency_hz:.6g}")
+    first = Ending.BEGINS_AT_FLIP.told(place=flips[-1].place())
     return make_branch("", nodes, specials, (first, reason), []), following
 
 
@@ -260,9 +265,9 @@ def _steps(
     """Amplitude of the first step off a flip, and step control up to the next one."""
     if len(flips) < 2:
         return 0.5 * options.max_step, options
-    gap = abs(flips[-1].frequency_hz / flips[-2].frequency_hz - 1.0) / FEIGENBAUM
+    gap = abs(flips[-1].point.point[-1] - flips[-2].point.point[-1]) / FEIGENBAUM
     try:
-        shift = doubled_parameter(flip(loop_of(flips[-1].orbit))[0]).value
+        shift = doubled_parameter(flip(loop_of(flips[-1].point))[0]).value
     except FAILURES:
         shift = math.nan
     reach = math.sqrt(gap / abs(shift)) if shift else math.nan

@@ -12,8 +12,9 @@ import numpy as np
 from nldyn.base.errors import SystemModelError
 from nldyn.branches.branch import Branch, Course
 from nldyn.flow.flow_map import FlowMap, same_flow
-from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.bordered import Place
 from nldyn.runtime.keeper import Keeper
+from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
 
@@ -103,7 +104,7 @@ class Checkpoint(Keeper[Branch]):
             self._held += self._earlier
         super().__exit__(error, *rest)
 
-    def branch_from(self, orbit: Orbit, *courses: Course) -> Branch | None:
+    def branch_from(self, place: Place, *courses: Course) -> Branch | None:
         """Take from the file the branch that was begun at an orbit with one of some courses.
 
         The first of them counts most.
@@ -115,7 +116,7 @@ class Checkpoint(Keeper[Branch]):
         """
         for course in courses:
             for number, branch in enumerate(self._earlier):
-                if _is_begun_at(branch, orbit, course):
+                if _is_begun_at(branch, place, course):
                     return self._taken(number)
         if self._strict and self._earlier:
             raise SystemModelError(
@@ -169,7 +170,8 @@ def checkpoint_of_several(
     place: BranchFile | None,
     finished: list[Branch],
     flow: FlowMap,
-    range_hz: tuple[float, float],
+    limits: tuple[float, float],
+    parameter: Parameter,
 ) -> Checkpoint:
     """The checkpoint of a computation of several branches of a system, added to a list.
 
@@ -185,8 +187,9 @@ def checkpoint_of_several(
     place.check_writable()
     earlier, tally = place.read_branches(flow.system)
     for branch in earlier:
-        same_range = branch.course is not None and branch.course.range_hz == range_hz
-        if not (same_range and same_flow(branch.points[0].problem.flow, flow)):
+        same_range = branch.course is not None and branch.course.limits == limits
+        same = same_flow(branch.nodes[0].family.problem.flow, flow)
+        if not (same_range and same and branch.parameter == parameter):
             raise SystemModelError(
                 f"{place.name}: holds branches of another system, accuracy or range; choose "
                 "another file, or delete it"
@@ -206,18 +209,21 @@ def checkpoint_of_several(
     return checkpoint
 
 
-def _is_begun_at(branch: Branch, orbit: Orbit, course: Course) -> bool:
+def _is_begun_at(branch: Branch, place: Place, course: Course) -> bool:
     """Whether a branch comes from a continuation of an orbit with the same range and options."""
     mine = branch.course
-    if mine is None or branch.period != orbit.period:
+    if mine is None or branch.period != place.orbit.period:
         return False
-    start = branch.nodes[mine.start].orbit
+    start = branch.nodes[mine.start]
+    problem, own = start.family.problem, place.family.problem
     return (
-        np.array_equal(start.point, orbit.point)
-        and start.observe == orbit.observe
-        and mine.range_hz == course.range_hz
+        np.array_equal(start.point, place.point)
+        and start.orbit.observe == place.orbit.observe
+        and start.family.scales == place.family.scales
+        and start.family.holds(place.orbit)
+        and mine.limits == course.limits
         and mine.options == course.options
         and np.array_equal(mine.open_ends, course.open_ends)
-        and start.problem.segments == orbit.problem.segments
-        and same_flow(start.problem.flow, orbit.problem.flow)
+        and problem.segments == own.segments
+        and same_flow(problem.flow, own.flow)
     )

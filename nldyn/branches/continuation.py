@@ -1,4 +1,4 @@
-"""Pseudo-arclength continuation of periodic orbits in the excitation frequency."""
+"""Pseudo-arclength continuation of periodic orbits in the frequency or another parameter."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from nldyn.base.errors import ConvergenceError, SystemModelError, check_range, c
 from nldyn.bifurcations.branch_crossing import (
     NEIGHBOUR,
     ON_CROSSING,
+    distance,
     lies_on_crossing,
     same_crossing,
 )
+from nldyn.bifurcations.chord import CROSSING_ERROR
+from nldyn.bifurcations.normal_form_coefficients import correct_across
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.at_frequency import check_requested, requested
 from nldyn.branches.branch import (
@@ -28,10 +31,14 @@ from nldyn.branches.leg import Leg, LegBuilder
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.prefetch import Ahead
+from nldyn.orbits.bordered import FREE, OrbitFamily, Place, correct
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
-from nldyn.runtime.progress import of_frequency, shows_progress
+from nldyn.runtime.progress import of_value, shows_progress
 from nldyn.runtime.threads import one_thread
+from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, told_value, value_of
+from nldyn.system.parameters import Parameter
+from nldyn.system.system import System
 
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
 MIDDLE = 0.1  # of that, within which it lies
@@ -40,11 +47,12 @@ ALONG = 0.99  # least cosine between two tangents of a branch at one place
 MET_AGAIN = 1e-6  # longest Newton step by which a solved orbit is met again across its branch
 
 
-@shows_progress(of_frequency("branch"))
+@shows_progress(of_value("branch"))
 def continue_branch(
     start: Orbit | Branch,
-    range_hz: tuple[float, float] | None = None,
+    limits: tuple[float, float] | None = None,
     *,
+    parameter: str | Parameter | None = None,
     name: str = "",
     options: ContinuationOptions | None = None,
     progress: Callable[[float], None] | None = None,
@@ -52,32 +60,35 @@ def continue_branch(
     at: Sequence[float] | None = None,
     checkpoint: BranchFile | Checkpoint | None = None,
 ) -> Branch:
-    """Continue an orbit in both directions through a range of frequencies, or go on with a branch.
+    """Continue an orbit in both directions through a range of a parameter, or go on with a branch.
 
-    A branch is finished where it was interrupted, and followed beyond the ends of its range. Its
-    points are those of one continuation through the new range, to the last digit; those at the
-    ends of the old range are left out.
+    The parameter is the excitation frequency unless another one is named; all others are held. A
+    branch is finished where it was interrupted, and followed beyond the ends of its range. Its
+    points are those of one continuation through the new range on its scale, to the last digit;
+    those at the ends of the old range are left out.
 
     Parameters
     ----------
     start : Orbit or Branch
-        Where to start. The frequency of an orbit must lie in the range; from a fold the first
-        point is 1e-4 of arclength away.
-    range_hz : (float, float)
-        Frequencies in Hz, ascending. The ends are met exactly. For a branch it contains the one of
-        before, which is kept unless given.
+        Where to start. The value of an orbit must lie in the range; from a fold the first point is
+        1e-4 of arclength away.
+    limits : (float, float)
+        Frequencies in Hz, or values of the parameter, ascending. The ends are met exactly. For a
+        branch it contains the range of before, which is kept unless given.
+    parameter : str or Parameter, optional
+        See `nldyn.system.chart.checked_parameter`; that of a branch is its own.
     name : str
         Name of the branch; one that goes on keeps its own.
     options : ContinuationOptions, optional
         Step control; for a branch from here on. With more `max_points`, or a smaller `min_step`,
         an end goes on that had come to the limit.
     progress : callable, optional
-        Called with the frequency of every point.
+        Called with the parameter's value at every point.
     open_ends : sequence of (N + 1,) arrays
         Where other branches were broken off, see `Stepper`.
     at : sequence of float, optional
-        Frequencies in Hz at which orbits are wanted: `Branch.requested` has all of them, at each
-        passage of the branch. For a branch those of before unless given.
+        Values at which orbits are wanted: `Branch.requested` has all of them, at each passage of
+        the branch. For a branch those of before unless given.
     checkpoint : CheckpointFile, optional
         File that keeps what is computed, written now and then, at the end, and when an exception
         such as Ctrl-C ends the computation. If it holds this very continuation, that one goes on
@@ -90,13 +101,13 @@ def continue_branch(
     Raises
     ------
     SystemModelError
-        If the range is empty, the orbit, a requested frequency or the range of before lies
-        outside, the branch was put together by hand, or `checkpoint` holds something else.
+        If the range is empty, the orbit, a requested value or the range of before lies outside,
+        there is no such parameter, the branch was put together by hand, or `checkpoint` holds
+        something else.
     OutputError
         If `checkpoint` cannot be written.
     ConvergenceError
-        If Newton's method does not meet the orbit again at its own frequency, or branches cross
-        there.
+        If Newton's method does not meet the orbit again at its own value, or branches cross there.
 
     References
     ----------
@@ -112,61 +123,77 @@ def continue_branch(
     >>> whole = continue_branch(orbit, (5.0, 20.0))
     >>> longer.frequency_hz.tolist() == whole.frequency_hz.tolist()
     True
+    >>> weaker = continue_branch(orbit, (0.01, 0.02), parameter="modal_damping")
+    >>> weaker.values[[0, -1]].tolist()
+    [0.01, 0.02]
     """
     if isinstance(start, Branch):
-        return extended(start, range_hz, options, at, progress, checkpoint)
-    if range_hz is None:
-        raise SystemModelError("continue_branch: an orbit needs a range_hz")
-    return _from_orbit(
-        start, range_hz, name, options, progress, open_ends, () if at is None else at, checkpoint
-    )
-
-
-def _from_orbit(
-    orbit: Orbit,
-    range_hz: tuple[float, float],
-    name: str,
-    options: ContinuationOptions | None,
-    progress: Callable[[float], None] | None,
-    open_ends: Sequence[Real],
-    at: Sequence[float],
-    checkpoint: BranchFile | Checkpoint | None,
-) -> Branch:
-    """The branch of an orbit; see `continue_branch`."""
+        return extended(start, limits, options, at, progress, checkpoint, parameter)
+    if limits is None:
+        raise SystemModelError("continue_branch: an orbit needs a range")
     check_types(
-        start=(orbit, Orbit),
+        start=(start, Orbit),
         name=(name, str),
         options=(options, ContinuationOptions, None),
         progress=(progress, Callable, None),
         open_ends=(open_ends, Sequence),
     )
-    check_minimal(orbit)
-    low, high = check_range(range_hz)
-    if not low * (1.0 - SLACK) <= orbit.frequency_hz <= high * (1.0 + SLACK):
-        raise SystemModelError(
-            f"the orbit at {orbit.frequency_hz:g} Hz lies outside range_hz = ({low:g}, {high:g})"
-        )
+    check_minimal(start)
+    family = family_over(start, limits, parameter)
+    chart = family.charts[0]
     course = Course(
-        (low, high),
+        (chart.low, chart.high),
         options or ContinuationOptions(),
-        alike(orbit, [numbers("open_ends", end) for end in open_ends]),
-        check_requested(at, (low, high)),
+        alike(family, [numbers("open_ends", end) for end in open_ends]),
+        check_requested(() if at is None else at, chart),
     )
-    start = start_point(orbit, 1.0, (low, high))
-    with checkpoint_at(checkpoint, orbit.system) as kept:
-        known = kept.branch_from(start.orbit, course)
+    first = start_point(family.place(start), 1.0)
+    with checkpoint_at(checkpoint, start.system) as kept:
+        known = kept.branch_from(first, course)
         if known is not None:
             return extended(known, at=at, progress=progress, checkpoint=kept)
-        return complete(name, None, None, start, course, progress, kept)
+        return complete(name, None, None, first, course, progress, kept)
+
+
+def family_over(
+    orbit: Orbit, limits: tuple[float, float], parameter: str | Parameter | None = None
+) -> OrbitFamily:
+    """The family of an orbit in one parameter over a range, checked.
+
+    Raises
+    ------
+    SystemModelError
+        If the range is empty or does not hold the orbit, or there is no such parameter.
+    """
+    chart = chart_over(orbit.system, limits, parameter)
+    value = value_of(orbit.system, orbit.frequency_hz, chart.parameter)
+    slack = SLACK * max(abs(chart.low), abs(chart.high))
+    if not chart.low - slack <= value <= chart.high + slack:
+        raise SystemModelError(
+            f"the orbit at {told_value(chart.parameter, value)} lies outside {chart.range_name} = "
+            f"({chart.low:g}, {chart.high:g})"
+        )
+    return OrbitFamily.around(orbit, (chart,))
+
+
+def chart_over(
+    system: System, limits: tuple[float, float], parameter: str | Parameter | None = None
+) -> Chart:
+    """The chart of a parameter of a system over a range, checked; of the frequency for None."""
+    chosen = checked_parameter(system, FREQUENCY if parameter is None else parameter)
+    if chosen.name == FREQUENCY:
+        return Chart(chosen, *check_range(limits))
+    return Chart.of(chosen, limits)
 
 
 def extended(
     branch: Branch,
-    range_hz: tuple[float, float] | None = None,
+    limits: tuple[float, float] | None = None,
     options: ContinuationOptions | None = None,
     at: Sequence[float] | None = None,
     progress: Callable[[float], None] | None = None,
     checkpoint: BranchFile | Checkpoint | None = None,
+    parameter: str | Parameter | None = None,
 ) -> Branch:
     """Finish or extend a branch; see `continue_branch`."""
     course = branch.course
@@ -174,25 +201,58 @@ def extended(
         raise SystemModelError(
             f"branch '{branch.name}' cannot be extended: it does not tell how it was continued"
         )
-    low, high = check_range(course.range_hz if range_hz is None else range_hz)
-    if not low <= course.range_hz[0] < course.range_hz[1] <= high:
+    if parameter not in (None, branch.parameter, branch.parameter.name):
         raise SystemModelError(
-            f"range_hz = ({low:g}, {high:g}) must contain the range of the branch, "
-            f"({course.range_hz[0]:g}, {course.range_hz[1]:g})"
+            f"branch '{branch.name}' was followed in {branch.parameter.name}: begin at one of its "
+            "orbits to follow another parameter"
         )
+    chart = _chart_beyond(branch, course.limits if limits is None else limits)
     new = replace(
         course,
-        range_hz=(low, high),
+        limits=(chart.low, chart.high),
         options=options or course.options,
-        at=check_requested(course.at if at is None else at, (low, high)),
+        at=check_requested(course.at if at is None else at, chart),
     )
-    with checkpoint_at(checkpoint, branch.points[0].system) as kept:
-        known = kept.branch_from(branch.points[course.start], new, course)
-        if known is not None and known.course is not None and known.course.range_hz == (low, high):
+    family = branch.nodes[0].family
+    branch = on_family(branch, replace(family, charts=(chart,)))
+    with checkpoint_at(checkpoint, family.system) as kept:
+        known = kept.branch_from(branch.nodes[course.start], new, course)
+        if known is not None and known.course is not None and known.course.limits == new.limits:
             branch, course = known, known.course  # this very extension was begun before
         forward, backward = split(branch, course)
         start = branch.nodes[course.start]
         return complete(branch.name, forward, backward, start, new, progress, kept)
+
+
+def _chart_beyond(branch: Branch, limits: tuple[float, float]) -> Chart:
+    """The chart of a branch over a range that contains the one of before."""
+    chart = branch.nodes[0].family.charts[0]
+    assert branch.course is not None
+    low, high = branch.course.limits
+    wider = chart_over(branch.nodes[0].family.system, limits, chart.parameter)
+    if chart.parameter.name != FREQUENCY:
+        wider = chart.over(limits)
+    if not wider.low <= low < high <= wider.high:
+        raise SystemModelError(
+            f"{chart.range_name} = ({wider.low:g}, {wider.high:g}) must contain the range of the "
+            f"branch, ({low:g}, {high:g})"
+        )
+    return wider
+
+
+def on_family(branch: Branch, family: OrbitFamily) -> Branch:
+    """The same branch with a family of the same scale."""
+
+    def moved(node: BranchNode) -> BranchNode:
+        return replace(node, family=family)
+
+    special = tuple(replace(s, point=moved(s.point)) for s in branch.special_points)
+    return replace(
+        branch,
+        nodes=tuple(map(moved, branch.nodes)),
+        special_points=special,
+        requested=tuple(map(moved, branch.requested)),
+    )
 
 
 @one_thread()
@@ -217,15 +277,15 @@ def complete(
     start : BranchNode
         Where both began, heading forward.
     course : Course
-        Range, options and requested frequencies.
+        Range, options and requested values.
     progress : callable, optional
-        Called with the frequency of every point.
+        Called with the parameter's value at every point.
     checkpoint : Checkpoint
         Keeps what is computed.
     ahead : Ahead, optional
         May have walked legs already, and walks the one backward while that forward is walked here.
     """
-    ahead = ahead or Ahead(start.orbit.problem.flow)
+    ahead = ahead or Ahead(start.family.problem.flow)
 
     def walked(
         leg: Leg | None, first: BranchNode, whole: Callable[[Leg | None], Branch | None]
@@ -235,12 +295,12 @@ def complete(
         key = leg_key(first, course)
         if leg is None and ahead.is_begun(key):
             checkpoint.work = lambda: whole(None)
-            here = first.orbit.frequency_hz
+            here = first.value
             waiting = partial(progress, here) if progress else None
             return ahead.value(key, walked_leg, first, course, meanwhile=waiting)
         ahead.forget(key)
         leg = leg or Leg([first], [], [], Ending.NOT_FINISHED.told(), None)
-        trail = LegBuilder.going_on(leg, course.range_hz, course.options, course.open_ends)
+        trail = LegBuilder.going_on(leg, course.limits, course.options, course.open_ends)
 
         checkpoint.work = lambda: whole(trail.so_far())
         return trail.follow(progress, kept)
@@ -250,14 +310,14 @@ def complete(
         ahead.look()
 
     if forward is None:
-        offer_leg(ahead, _reversed(start), course, first=True)
+        offer_leg(ahead, start.reversed(), course, first=True)
     forward = walked(forward, start, lambda leg: join(name, leg, backward, course) if leg else None)
     if forward.reason.ending is Ending.CLOSED_BRANCH:
-        ahead.forget(leg_key(_reversed(start), course))
+        ahead.forget(leg_key(start.reversed(), course))
         backward = None
     else:
         done = forward
-        backward = walked(backward, _reversed(start), lambda leg: join(name, done, leg, course))
+        backward = walked(backward, start.reversed(), lambda leg: join(name, done, leg, course))
     branch = join(name, forward, backward, course)
     points, lost = requested(branch.places, course.at)
     lost = [note for note in lost if note not in branch.notes]
@@ -272,16 +332,16 @@ def walked_leg(
 ) -> Leg:
     """The leg of a branch from a point on, whole; ``look`` is called on the way."""
     leg = Leg([first], [], [], Ending.NOT_FINISHED.told(), None)
-    trail = LegBuilder.going_on(leg, course.range_hz, course.options, course.open_ends)
+    trail = LegBuilder.going_on(leg, course.limits, course.options, course.open_ends)
     return trail.follow(keep=look)
 
 
 def leg_key(first: BranchNode, course: Course) -> Hashable:
     """What a leg depends on, beside the flow map and how orbits are told."""
-    orbit = first.orbit
+    family = first.family
     return (
-        orbit.period, orbit.problem.segments, orbit.observe, orbit.point.tobytes(),
-        first.tangent.tobytes(), course.range_hz, course.options, course.open_ends.tobytes(),
+        family.period, family.segments, family.observe, family.scales, first.point.tobytes(),
+        first.tangent.tobytes(), course.limits, course.options, course.open_ends.tobytes(),
     )  # fmt: skip
 
 
@@ -302,14 +362,14 @@ def offer_leg(
 def offer_branch(ahead: Ahead, start: BranchNode, course: Course, group: Hashable = None) -> None:
     """Let both legs of a branch be walked ahead."""
     member = leg_key(start, course)
-    for point in (start, _reversed(start)):
+    for point in (start, start.reversed()):
         offer_leg(ahead, point, course, group=group, member=member)
 
 
-def start_point(orbit: Orbit, direction: float, range_hz: tuple[float, float]) -> BranchNode:
-    """Branch point at an orbit, heading up (+1) or down (-1) in frequency.
+def start_point(place: Place, direction: float) -> BranchNode:
+    """Branch point at an orbit of a family, heading up (+1) or down (-1) in its parameter.
 
-    Beside a flip or a fold, where the frequency hardly tells the orbits of a branch apart, the
+    Beside a flip or a fold, where the parameter hardly tells the orbits of a branch apart, the
     orbit is met again on the plane across the branch. From a fold it is a short way to the point,
     if that lies in the range: at the fold itself rounding decides on which side the orbit is.
 
@@ -319,29 +379,55 @@ def start_point(orbit: Orbit, direction: float, range_hz: tuple[float, float]) -
         If Newton's method does not meet the orbit again, or branches cross so near to it that it
         may be of either.
     """
-    if lies_on_crossing(orbit, ON_CROSSING):
+    family, point = place.family, place.point
+    chart = family.charts[0]
+    where = told_value(chart.parameter, chart.value(float(point[-1])))
+    if lies_on_crossing(place, ON_CROSSING):
         raise ConvergenceError(
-            f"branches cross at the orbit at {orbit.frequency_hz:g} Hz: begin farther from there, "
-            "or with one of switch_branch"
+            f"branches cross at the orbit at {where}: begin farther from there, or with one of "
+            "switch_branch"
         )
-    problem = orbit.problem
-    towards = np.zeros(orbit.point.size)
+    towards = np.zeros(point.size)
     towards[-1] = direction
-    found = problem.correct(orbit.point, towards)
-    if np.isfinite(found.along).all() and found.along.any():
-        along = problem.tangent(found, towards)
-        across = problem.metric(orbit.point) * along
-        again = problem.correct(orbit.point, across, longest=MET_AGAIN)
-        # exactly at a fold the frequency may hold the orbit and give a direction that is rounding
-        astray = again.converged and abs(float(problem.tangent(again, along) @ across)) < ALONG
-        if astray or not found.converged:
-            found = again
-    if not found.converged:
-        raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: {found.failure}")
-    here = BranchNode(orbit, problem.tangent(found, towards), 0.0)
+    try:
+        here = BranchNode.of(place, _tangent_at(place, towards), 0.0)
+    except ConvergenceError as error:
+        raise ConvergenceError(f"no orbit at {where}: {error}") from None
     beside = _beside_fold(here, direction)
-    low, high = range_hz
-    return beside if beside and low <= beside.orbit.frequency_hz <= high else here
+    return beside if beside and chart.low <= beside.value <= chart.high else here
+
+
+def _tangent_at(place: Place, towards: Real) -> Real:
+    """Unit tangent of a branch at an orbit that Newton's method meets again.
+
+    It is met at its parameter, or, where that may be another one, across its branch. Exactly at a
+    fold the parameter may hold the orbit and give a direction that is rounding. Right beside a
+    crossing the steps of Newton's method may be rounding, too, but for those of `correct_across`.
+
+    Raises
+    ------
+    ConvergenceError
+        If it is not met.
+    """
+    family, point = place.family, place.point
+    found = correct(family, point, FREE, towards)
+    known = found.converged or found.solution is not None
+    here = found if known else replace(found, at=family.at(point))
+    if not (np.isfinite(here.along).all() and here.along.any()):
+        raise ConvergenceError(found.failure or "the motion has no finite derivatives")
+    along = here.tangent(towards)
+    across = family.metric(point) * along
+    again = correct(family, point, FREE, across, longest=MET_AGAIN)
+    astray = again.converged and abs(float(again.tangent(along) @ across)) < ALONG
+    if astray or (again.converged and not found.converged):
+        return again.tangent(towards)
+    if found.converged:
+        return along
+    row = across / np.linalg.norm(across)
+    met = correct_across(family, point, row, float(row @ point))
+    if met is None or met.orbit.error > CROSSING_ERROR or distance(place, met) > MET_AGAIN:
+        raise ConvergenceError(again.failure)
+    return along
 
 
 def _beside_fold(here: BranchNode, direction: float) -> BranchNode | None:
@@ -351,20 +437,20 @@ def _beside_fold(here: BranchNode, direction: float) -> BranchNode | None:
     """
     if abs(float(here.tangent[-1])) > NEARLY_FLAT:
         return None
-    problem, place = here.orbit.problem, here.orbit.point
-    across = problem.metric(place) * here.tangent
+    family, place = here.family, here.point
+    across = family.metric(place) * here.tangent
     sides = [
-        problem.correct(place + way * here.tangent, across, longest=FROM_FOLD)
+        correct(family, place + way * here.tangent, FREE, across, longest=FROM_FOLD)
         for way in (-FROM_FOLD, FROM_FOLD)
     ]
     if not all(side.converged for side in sides):
         return None
-    tangents = [problem.tangent(side, here.tangent) for side in sides]
+    tangents = [side.tangent(here.tangent) for side in sides]
     first, last = (float(tangent[-1]) for tangent in tangents)
     if abs(first + last) > MIDDLE * abs(first - last):
         return None
     index = int(last * direction > 0.0)
-    return BranchNode(Orbit.of(problem, sides[index], here.orbit.observe), tangents[index], 0.0)
+    return BranchNode.of(sides[index], tangents[index], 0.0)
 
 
 def goes_on(leg: Leg, course: Course) -> bool:
@@ -375,10 +461,10 @@ def goes_on(leg: Leg, course: Course) -> bool:
         return True
     if end is None:
         return False
-    if ending is Ending.RANGE_END:
-        low, high = course.range_hz
-        last_hz = leg.nodes[-1].orbit.frequency_hz
-        return low * (1.0 + SLACK) < last_hz < high * (1.0 - SLACK)
+    if ending in (Ending.RANGE_END, Ending.PARAMETER_RANGE_END):
+        low, high = course.limits
+        slack = SLACK * max(abs(low), abs(high))
+        return low + slack < leg.nodes[-1].value < high - slack
     if ending is Ending.MOST_POINTS:
         return options.max_points > end.count
     if ending is Ending.SHORT_STEP:
@@ -395,7 +481,7 @@ def join(name: str, forward: Leg, backward: Leg | None, course: Course) -> Branc
     forward, backward = _without_repeat(forward, backward)
     branch = make_branch(
         name,
-        [_reversed(point) for point in backward.nodes[:0:-1]] + forward.nodes,
+        [point.reversed() for point in backward.nodes[:0:-1]] + forward.nodes,
         [_reversed_special(s) for s in reversed(backward.special_points)] + forward.special_points,
         (backward.reason, forward.reason),
         backward.notes + forward.notes,
@@ -444,7 +530,7 @@ def split(branch: Branch, course: Course) -> tuple[Leg, Leg | None]:
     if course.ends[0] is None:
         return forward, None
     backward = Leg(
-        [_reversed(point) for point in nodes[start::-1]],
+        [point.reversed() for point in nodes[start::-1]],
         [_reversed_special(s) for s in reversed(special[:specials])],
         list(notes[:lines]),
         first,
@@ -465,12 +551,8 @@ def make_branch(
     return Branch(name, period, tuple(nodes), tuple(special), reasons, tuple(notes))
 
 
-def _reversed(point: BranchNode) -> BranchNode:
-    return BranchNode(point.orbit, -point.tangent, -point.arclength)
-
-
 def _reversed_special(special: SpecialPoint) -> SpecialPoint:
-    return SpecialPoint(special.kind, _reversed(special.point), special.frequency_error)
+    return replace(special, point=special.point.reversed())
 
 
 def broken_off(branch: Branch) -> list[tuple[BranchNode, StopReason]]:
@@ -480,12 +562,12 @@ def broken_off(branch: Branch) -> list[tuple[BranchNode, StopReason]]:
 
 
 def open_ends(branch: Branch) -> list[Real]:
-    """Shooting unknowns where a branch was broken off, shifted by all its excitation periods."""
-    ends = [end.orbit for end, _ in broken_off(branch)]
-    return [place for orbit in ends for place in shifts(orbit.problem, orbit.point)]
+    """Unknowns where a branch was broken off, shifted by all its excitation periods."""
+    ends = [end for end, _ in broken_off(branch)]
+    return [place for end in ends for place in shifts(end.family.problem, end.point)]
 
 
-def alike(orbit: Orbit, places: Sequence[Real]) -> Real:
-    """Those of some shooting unknowns that are as many as an orbit's, (m, N + 1)."""
-    size = orbit.point.size
+def alike(family: OrbitFamily, places: Sequence[Real]) -> Real:
+    """Those of some unknowns that are as many as a family's, (m, N + 1)."""
+    size = family.n_states + family.n_free
     return np.array([place for place in places if place.size == size]).reshape(-1, size)

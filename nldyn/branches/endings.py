@@ -23,31 +23,31 @@ class Ending(Enum):
     SCALES_TO_REST = "the orbits shrink in proportion to {parameter}, to rest where it is zero"
     CLOSED_BRANCH = "closed branch"
     CLOSED_CURVE = "closed curve"
-    JOINS = "joins the branch of period {period} at the flip at {hz} Hz"
+    JOINS = "joins the branch of period {period} at the flip at {place}"
     MEETS_HALF_PERIOD = (
-        "meets the branch of period {period} beyond {hz} Hz, where no orbit of that period was "
+        "meets the branch of period {period} beyond {place}, where no orbit of that period was "
         "found"
     )
     MEETS_HALF_PERIODS = "meets orbits of period {period}"
     MEETS_OPEN_END = "meets another branch where that was broken off"
     COMES_BACK = (
-        "comes back to where it had been at {hz} Hz: on the way it left the branch for another one "
+        "comes back to where it had been at {place}: on the way it left the branch for another one "
         "that lies too near"
     )
-    BEGINS_AT_FLIP = "begins at the flip at {hz} Hz"
+    BEGINS_AT_FLIP = "begins at the flip at {place}"
     FLIP = "a flip"
     RESONANCE = "becomes a curve of neutral saddles at a resonance"
     EXTREME_VANISHES = "the extreme that grazes meets another one, and both vanish"
     DISSOLVED = "the branch point dissolves, as the symmetry does that brings it about"
     CORNER = "a stop is grazed, where the curve has a corner that is not followed"
     OTHER_EXTREME = "another extreme gets as large as the one held, where that has a corner"
-    GROWS = "grows without bound towards {hz} Hz, where an undamped mode resonates"
-    GRAZES_RIGID = "grazes a rigid stop at {hz} Hz, where a multiplier tends to infinity"
+    GROWS = "grows without bound towards {place}, where an undamped mode resonates"
+    GRAZES_RIGID = "grazes a rigid stop at {place}, where a multiplier tends to infinity"
     TO_REST = (
-        "one more impact grazes at each of ever closer frequencies: near {hz} Hz they become a "
+        "one more impact grazes at each of ever closer {what}: near {place} they become a "
         "series without end, behind which the motion comes to rest"
     )
-    FAILS = "what lies beyond {hz} Hz could not be computed: {obstacle}"
+    FAILS = "what lies beyond {place} could not be computed: {obstacle}"
     MOST_POINTS = "{points} points"
     SHORT_STEP = "step below {step}: {obstacle}"
     OTHER = "{sentence}"  # of an earlier version

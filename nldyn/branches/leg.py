@@ -11,20 +11,25 @@ from operator import attrgetter
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES
-from nldyn.bifurcations.beyond_rigid_grazing import beyond_rigid_grazing, crosses_beside
+from nldyn.bifurcations.beyond_rigid_grazing import (
+    SLIGHT,
+    SLIGHT_BY_DIFFERENCES,
+    beyond_rigid_grazing,
+    crosses_beside,
+)
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossing, without_repeats
 from nldyn.bifurcations.chord import Chord
-from nldyn.bifurcations.point import BranchNode, SpecialPoint
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, place_of
 from nldyn.bifurcations.touching import grazes_exactly, rigid_grazing, rigid_touches
 from nldyn.bifurcations.within_step import insert_dip, special_points_between
 from nldyn.branches.arclength import Stepper, StepperState
 from nldyn.branches.branch import WalkEnd
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.step_control import ContinuationOptions
-from nldyn.orbits.bordered import length_unit
-from nldyn.orbits.conditions import nearest_grazing
+from nldyn.orbits.bordered import Solved, length_unit
+from nldyn.orbits.conditions import grazing_beside
 from nldyn.orbits.orbit import Orbit, same_orbit
-from nldyn.orbits.shooting import metric_length
+from nldyn.system.chart import FREQUENCY, told_value
 
 AT_FLIP = 1e-5  # distance of a turn of a doubled branch from its end that may be the flip itself
 FLAT = 1e-4  # frequency part of tangents beside such a turn, below which it is
@@ -90,12 +95,12 @@ class LegBuilder:
     def going_on(
         cls,
         leg: Leg,
-        range_hz: tuple[float, float],
+        limits: tuple[float, float],
         options: ContinuationOptions,
         open_ends: Real,
     ) -> LegBuilder:
         """The same walk with another end of its range or other options."""
-        walk = Stepper(leg.nodes[0], range_hz, options, open_ends)
+        walk = Stepper(leg.nodes[0], limits, options, open_ends)
         end = leg.end
         if end is None:
             return cls(walk)
@@ -119,7 +124,7 @@ class LegBuilder:
         Parameters
         ----------
         progress : callable, optional
-            Called with the frequency of every point.
+            Called with the parameter's value at every point.
         keep : callable, optional
             Called after every point, when `so_far` tells of it.
         """
@@ -129,11 +134,11 @@ class LegBuilder:
                 if not self._passes_grazing():
                     break
             except FAILURES as error:
-                hz = f"{self.nodes[-1].orbit.frequency_hz:.9g}"
-                self.walk.stop_reason = Ending.FAILS.told(hz=hz, obstacle=error)
+                place = place_of(self.nodes[-1], 9)
+                self.walk.stop_reason = Ending.FAILS.told(place=place, obstacle=error)
                 break
             if progress is not None:
-                progress(self.nodes[-1].orbit.frequency_hz)
+                progress(self.nodes[-1].value)
         ending = self.walk.stop_reason.ending
         if ending is Ending.COMES_BACK:
             self.notes.append(self.walk.stop_reason)
@@ -155,7 +160,7 @@ class LegBuilder:
         for point in self.walk:
             self.nodes.append(point)
             if progress is not None:
-                progress(point.orbit.frequency_hz)
+                progress(point.value)
             if len(self.nodes) - self._piece > 2:
                 insert_dip(self.nodes, len(self.nodes) - 2)
             regular = self.walk.stride is not None and self.walk.stride.here is point
@@ -185,16 +190,17 @@ class LegBuilder:
         beyond = None
         if grazing.orbit is not last.orbit:
             beyond = beyond_rigid_grazing(grazing.point, last.orbit)
+            slight = SLIGHT if last.family.is_exact else SLIGHT_BY_DIFFERENCES
             sides = [last.orbit] if beyond is None else [last.orbit, beyond.orbit]
-            if any(crosses_beside(grazing.orbit, side) for side in sides):
+            if any(crosses_beside(grazing.orbit, side, slight[-1]) for side in sides):
                 self.notes.append(
-                    f"special points near {grazing.frequency_hz:.8g} Hz may be missing: "
+                    f"special points near {grazing.place(8)} may be missing: "
                     "multipliers may cross the unit circle right beside the grazing"
                 )
         if beyond is None:
             ends = _nears_rest(grazing.orbit, last.orbit, SHORT_SERIES)
-            hz = f"{grazing.frequency_hz:.9g}"
-            walk.stop_reason = self._to_rest() if ends else Ending.GRAZES_RIGID.told(hz=hz)
+            reason = Ending.GRAZES_RIGID.told(place=grazing.place(9))
+            walk.stop_reason = self._to_rest() if ends else reason
             return False
         walk.begin_anew(beyond, beyond.arclength - grazing.point.arclength)
         self.nodes.append(beyond)
@@ -203,7 +209,10 @@ class LegBuilder:
         return True
 
     def _to_rest(self) -> StopReason:
-        return Ending.TO_REST.told(hz=f"{limit_of_grazings(self.special_points):.7g}")
+        limit = limit_of_grazings(self.special_points)
+        parameter = self.nodes[0].parameter
+        what = "frequencies" if parameter.name == FREQUENCY else f"values of {parameter.name}"
+        return Ending.TO_REST.told(what=what, place=told_value(parameter, limit, digits=7))
 
     def _once_around(self) -> list[SpecialPoint]:
         """The special points of a closed branch, whose last step leads beyond the start.
@@ -248,7 +257,7 @@ class LegBuilder:
         """Whether a turn of a doubled branch is where it joins the one that it comes from."""
         if special.kind not in ("BP", "LP"):
             return False
-        if distance(self.nodes[-1].orbit, special.orbit) > AT_FLIP:
+        if distance(self.nodes[-1], special.point) > AT_FLIP:
             return False
         after = bisect(self.nodes, special.point.arclength, key=attrgetter("arclength"))
         beside = self.nodes[max(after - 1, 0) : after + 1]
@@ -281,7 +290,7 @@ class LegBuilder:
         beside it. What lies behind is moved by the length of the detour.
         """
         a, b = self.nodes[self._searched : self._searched + 2]
-        between = _detour(a, b, self.walk, self.walk.range_hz)
+        between = _detour(a, b, self.walk, self.walk.limits)
         if between is None:
             return False
         longer = _arclength_behind(between, b) - b.arclength
@@ -323,10 +332,10 @@ class LegBuilder:
 
         To know b again it must pass it, also at the end of the range. None if any may be missing.
         """
-        low, high = self.walk.range_hz
-        step = b.arclength - a.arclength
-        beyond = math.exp(BEYOND * step)
-        between = _detour(a, b, self.walk, (low / beyond, high * beyond))
+        step, chart = b.arclength - a.arclength, a.family.charts[0]
+        low, high = map(chart.coordinate, self.walk.limits)
+        beyond = chart.value(low - BEYOND * step), chart.value(high + BEYOND * step)
+        between = _detour(a, b, self.walk, beyond)
         if between is None:
             return None
         longer = (_arclength_behind(between, b) - a.arclength) / step
@@ -344,16 +353,16 @@ def _grazing_at_end(nodes: Sequence[BranchNode]) -> SpecialPoint:
     Where that fails it is the last point, with what is left of the way to the grazing.
     """
     last = nodes[-1]
-    exact = nearest_grazing(last.orbit)
-    if exact is not None:
-        weights = exact.problem.metric(exact.point)
-        length = last.arclength + metric_length(weights, exact.point - last.orbit.point)
-        return SpecialPoint("GR", BranchNode(exact, last.tangent, length), exact.error)
+    met = grazing_beside(last)
+    if met is not None:
+        exact = Solved(last.family, met.point, met.orbit)
+        length = last.arclength + distance(exact, last)
+        return SpecialPoint("GR", BranchNode.of(exact, last.tangent, length), met.orbit.error)
     error = last.orbit.error
     here = rigid_grazing(last.orbit)
     before = rigid_grazing(nodes[-2].orbit) if len(nodes) > 1 else None
     if here and before and before[2] != here[2]:
-        way = last.orbit.frequency_hz - nodes[-2].orbit.frequency_hz
+        way = float(last.point[-1] - nodes[-2].point[-1])
         error += abs(way * here[2] / (before[2] - here[2]))
     return SpecialPoint("GR", last, error)
 
@@ -371,12 +380,12 @@ def _nears_rest(at: Orbit, before: Orbit, count: int) -> bool:
 
 
 def limit_of_grazings(found: Sequence[SpecialPoint]) -> float:
-    """Frequency in Hz to which grazings tend at distances of a geometric series, or the last one.
+    """Value to which grazings tend at distances of a geometric series, or the last one.
 
     So do those of impacts that come to rest (Budd and Dux 1994, *Phil. Trans. R. Soc. Lond. A* 347,
     365-389).
     """
-    *_, first, middle, last = [math.nan] * 3 + [s.frequency_hz for s in found if s.kind == "GR"]
+    *_, first, middle, last = [math.nan] * 3 + [s.value for s in found if s.kind == "GR"]
     ratio = (last - middle) / (middle - first) if middle != first else math.nan
     return last + (last - middle) * ratio / (1.0 - ratio) if 0.0 < ratio < 1.0 else last
 
@@ -394,7 +403,7 @@ def not_told_apart(found: Sequence[SpecialPoint]) -> list[str]:
         else:
             groups.append([special])
     return [
-        f"{', '.join(s.kind for s in group)} near {group[0].frequency_hz:.8g} Hz lie so close "
+        f"{', '.join(s.kind for s in group)} near {group[0].place(8)} lie so close "
         "together that neither their order nor their kinds are sure"
         for group in groups
         if len(group) > 2 or (len(group) == 2 and "BP" in [s.kind for s in group])
@@ -403,7 +412,7 @@ def not_told_apart(found: Sequence[SpecialPoint]) -> list[str]:
 
 def trace(
     start: BranchNode,
-    range_hz: tuple[float, float],
+    limits: tuple[float, float],
     options: ContinuationOptions | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[list[BranchNode], list[SpecialPoint], str, list[str]]:
@@ -413,25 +422,25 @@ def trace(
     ----------
     start : BranchNode
         Where to begin.
-    range_hz : (float, float)
-        Frequencies in Hz.
+    limits : (float, float)
+        Values of the parameter between which to stay.
     options : ContinuationOptions, optional
         Step control.
     progress : callable, optional
-        Called with the frequency of every point.
+        Called with the parameter's value at every point.
 
     Returns
     -------
     nodes, special_points, reason, notes
         As those of a `Leg`.
     """
-    trail = LegBuilder(Stepper(start, range_hz, options or ContinuationOptions()))
+    trail = LegBuilder(Stepper(start, limits, options or ContinuationOptions()))
     leg = trail.follow(progress)
     return leg.nodes, leg.special_points, leg.reason, leg.notes
 
 
 def _detour(
-    a: BranchNode, b: BranchNode, walk: Stepper, range_hz: tuple[float, float]
+    a: BranchNode, b: BranchNode, walk: Stepper, limits: tuple[float, float]
 ) -> list[BranchNode] | None:
     """Points of a walk with shorter steps from a that passes b in its direction, or None."""
     first_step = (b.arclength - a.arclength) / DETOUR_STEPS
@@ -443,21 +452,19 @@ def _detour(
         max_step=DETOUR_GROWTH * first_step,
         max_points=MOST_DETOUR,
     )
-    inner = Stepper(a, range_hz, options, b.orbit.point[None])
+    inner = Stepper(a, limits, options, b.point[None])
     between = list(inner)[1:-1]
     if inner.stop_reason.ending is not Ending.MEETS_OPEN_END or not between:
         return None
     last = between[-1]
-    weights = last.orbit.problem.metric(last.orbit.point)
-    ahead = float((b.orbit.point - last.orbit.point) @ (weights * b.tangent))
+    ahead = float((b.point - last.point) @ (last.family.metric(last.point) * b.tangent))
     return between if ahead > 0.0 else None
 
 
 def _arclength_behind(way: Sequence[BranchNode], b: BranchNode) -> float:
     """Arclength of a point that is met behind a way."""
     last = way[-1]
-    weights = last.orbit.problem.metric(last.orbit.point)
-    return last.arclength + metric_length(weights, b.orbit.point - last.orbit.point)
+    return last.arclength + distance(last, b)
 
 
 def _by_halves(
@@ -472,9 +479,9 @@ def _by_halves(
             raise reason
         middle = Chord(a, b).at(0.5)
     except FAILURES as error:
-        low, high = (f"{hz:.8g}" for hz in sorted(p.orbit.frequency_hz for p in (a, b)))
-        place = f"between {low} and {high}" if low != high else f"near {low}"
-        return [], [f"special points {place} Hz may be missing: {error}"]
+        place = told_value(a.parameter, *sorted((a.value, b.value)), digits=8)
+        where = "between" if " and " in place else "near"
+        return [], [f"special points {where} {place} may be missing: {error}"]
     return _in_pieces([a, middle, b], depth + 1)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -39,15 +40,15 @@ class Peak:
         return self.orbit.max_abs_displacement
 
 
-def resonance_peaks(branch: Branch, range_hz: tuple[float, float] | None = None) -> list[Peak]:
+def resonance_peaks(branch: Branch, limits: tuple[float, float] | None = None) -> list[Peak]:
     """Tops of a branch, in order along it, refined between the computed points.
 
     Parameters
     ----------
     branch : Branch
         A branch.
-    range_hz : (float, float), optional
-        Only tops between these frequencies.
+    limits : (float, float), optional
+        Only tops between these values of the parameter.
 
     Returns
     -------
@@ -58,27 +59,27 @@ def resonance_peaks(branch: Branch, range_hz: tuple[float, float] | None = None)
     >>> resonance_peaks(branch, (20.0, 30.0))[0].frequency_hz       # doctest: +SKIP
     25.371
     """
-    low, high = range_hz or (0.0, float("inf"))
+    low, high = limits or (-math.inf, math.inf)
     peaks = []
     for around in _neighbourhoods(branch):
         if len(around) < 3:
             continue
         before, here, after = (node.orbit.max_abs_displacement for node in around)
-        if before <= here > after and low <= around[1].orbit.frequency_hz <= high:
+        if before <= here > after and low <= around[1].value <= high:
             peaks.append(Peak(_refined(around, 1.0)))
     return peaks
 
 
-def lowest_orbit(branch: Branch, range_hz: tuple[float, float]) -> Orbit | None:
-    """The orbit of smallest largest displacement between two frequencies, refined as the tops are.
+def lowest_orbit(branch: Branch, limits: tuple[float, float]) -> Orbit | None:
+    """The orbit of smallest largest displacement between two values, refined as the tops are.
 
     None if the branch has no computed point there.
     """
-    low, high = range_hz
+    low, high = limits
     inside = [
         (node.orbit.max_abs_displacement, around)
         for node, around in zip(branch.nodes, _neighbourhoods(branch), strict=False)
-        if low <= node.orbit.frequency_hz <= high
+        if low <= node.value <= high
     ]
     return _refined(min(inside, key=lambda pair: pair[0])[1], -1.0) if inside else None
 

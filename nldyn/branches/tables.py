@@ -14,6 +14,8 @@ from nldyn.base.optional import optional
 from nldyn.base.version import software_version
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.orbits.orbit import Orbit
+from nldyn.system.chart import parameter_name
+from nldyn.system.parameters import Parameter
 
 if TYPE_CHECKING:
     import pandas
@@ -99,14 +101,15 @@ def point_columns(
 
 
 def special_columns(
-    special: Sequence[SpecialPoint], columns: dict[str, NDArray[Any]]
+    special: Sequence[SpecialPoint], columns: dict[str, NDArray[Any]], parameter: Parameter
 ) -> dict[str, NDArray[Any]]:
-    """Give the columns of special points: their type first, and the error of their frequency."""
-    errors = np.array([point.frequency_error for point in special], dtype=float)
+    """Give the columns of special points: their type first, and the error of their parameter."""
+    name = parameter_name(parameter).removesuffix("_hz")
+    errors = np.array([point.error for point in special], dtype=float)
     return {
         "type": np.array([point.kind for point in special], dtype=str),
         **columns,
-        "frequency_error": errors,
+        f"{name}_error": errors,
     }
 
 

@@ -244,7 +244,7 @@ def _rigid_grazing(beside: CurvePoint) -> LocatedPoint:
         If it is not found.
     """
     family = beside.found.at.family
-    found = grazing_beside(beside.orbit, family)
+    found = grazing_beside(beside)
     if found is None:
         raise LocateError("the grazing of a rigid stop was not found")
     return LocatedPoint(
@@ -257,7 +257,7 @@ def beyond_grazing(end: CurvePoint) -> CurvePoint | None:
     """Where a curve of orbits in one parameter goes on behind a grazing of a rigid stop."""
     if not isinstance(end.condition, Free):
         return None
-    family, grazing = end.found.at.family, grazing_beside(end.orbit, end.found.at.family)
+    family, grazing = end.found.at.family, grazing_beside(end)
     if grazing is None:
         return None
     found = orbit_beyond(grazing.orbit, end.orbit, family)

@@ -13,7 +13,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES
 from nldyn.curves.codimension_two import codimension_tests
-from nldyn.orbits.bordered import Condition, Corrected, Evaluation, Free, correct
+from nldyn.orbits.bordered import Condition, Corrected, Evaluation, Free, OrbitFamily, correct
 from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.impact_phases import nodes_to_impacts, start_far_from_impacts
 from nldyn.orbits.orbit import Orbit
@@ -49,6 +49,11 @@ class CurvePoint:
     arclength: float
 
     corner: str = ""
+
+    @property
+    def family(self) -> OrbitFamily:
+        """The family."""
+        return self.found.at.family
 
     @property
     def point(self) -> Real:
@@ -101,7 +106,7 @@ class CurvePoint:
             If the flow map fails, or there is no tangent.
         """
         at = self.found.at
-        family = replace(at.family, start=start)
+        family = at.family.shot_from(start)
         found = replace(self.found, at=family.at(family.unknowns(self.orbit)))
         towards = np.zeros(self.tangent.size)
         towards[family.n_states :] = self.tangent[family.n_states :]

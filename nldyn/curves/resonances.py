@@ -124,15 +124,8 @@ def _forced(flow: FlowMap, free: Orbit, charts: tuple[Chart, Chart]) -> Orbit:
     sources = list(system.excitation)
     changed: dict[str, Any] = {name: value}
     sources[index] = replace(source, **changed)
-    family = OrbitFamily(
-        system.with_elements(excitation=tuple(sources)),
-        flow.options,
-        1,
-        problem.segments,
-        observe,
-        free.frequency_hz,
-        charts,
-    )
+    forced = FlowMap(system.with_elements(excitation=tuple(sources)), flow.options)
+    family = OrbitFamily(replace(problem, flow=forced), observe, free.frequency_hz, charts)
     held = [charts[0].coordinate(free.frequency_hz), charts[1].coordinate(value)]
     guess = np.append(nodes.ravel(), held)
     row = family.metric(guess) * guess

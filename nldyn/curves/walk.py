@@ -19,6 +19,7 @@ from nldyn.branches.arclength import (
     grazes_rigid,
     grazing_between,
     loses_impact,
+    scales,
 )
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.step_control import ContinuationOptions
@@ -36,12 +37,12 @@ from nldyn.orbits.bordered import Condition, Free, correct, nearest_depth
 from nldyn.orbits.conditions import BranchPointCondition, Grazing, Held, Singular
 from nldyn.orbits.impact_phases import nodes_to_impacts, start_far_from_impacts
 from nldyn.orbits.shooting import FROM_NEAR, metric_length
+from nldyn.system.chart import told_value
 
 UNFOLDED = 1e-6  # unfolding number from which a branch point has dissolved
 ALONG = 1e-12  # part of a unit tangent that is rounding
 FASTEST = 20.0  # change of an impact's phase with the arclength, at most, in rad
 CLEAR_OF_NODES = 3e-3  # rad from an impact to one, from which derivatives do not reach across it
-SCALES = 1e-8  # relative departure from a proportional change that is rounding
 MOST_OVER_NODE = 8  # steps, none of which leads clear of it where the impact moves slowly
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)  # of a step that leads over a phase of shooting
 # The condition of a Neimark-Sacker point holds for neutral saddles, too, and some may be near: the
@@ -61,7 +62,10 @@ def _grazes_rigid(here: CurvePoint, least: float, most: float) -> StopReason | N
         def but(stop: int, phase: float) -> bool:
             return condition.is_of(stop, True, phase, orbit.period)
 
-    return grazes_rigid(orbit, least, most, but)
+    if not grazes_rigid(orbit, least, most, but):
+        return None
+    chart, value = here.family.charts[0], float(here.values[0])
+    return Ending.GRAZES_RIGID.told(place=told_value(chart.parameter, value, digits=9))
 
 
 @dataclass
@@ -286,7 +290,7 @@ class CurveWalk:
             return None
         if family.charts[0].low != 0.0 or here.tangent[-1] >= 0.0:
             return None
-        if not (_scales(before) and _scales(here)):
+        if not all(scales(point.point, point.tangent) for point in (before, here)):
             return None
         length = metric_length(family.metric(here.point), here.point)
         rest = on_plane(here, -here.point, length, 0, 0.0)
@@ -319,7 +323,7 @@ class CurveWalk:
         if isinstance(here.condition, BranchPointCondition) and abs(there.point[-1]) > UNFOLDED:
             self.stop_reason = Ending.DISSOLVED.told()
             return []
-        if passed_flip(here.orbit, there.orbit):
+        if passed_flip(here, there):
             self.stop_reason = Ending.MEETS_HALF_PERIODS.told(period=here.orbit.period // 2)
             return []
         if is_torus_curve(here.condition) and not is_torus(there.orbit.multipliers):
@@ -343,13 +347,6 @@ class CurveWalk:
             return False
         off = way - along / length2 * step
         return float(off @ (weights * off)) < BESIDE_STEP * length2
-
-
-def _scales(point: CurvePoint) -> bool:
-    """Whether the states of a curve in one parameter change in proportion to it."""
-    states, along = point.point[:-1], point.tangent[:-1]
-    off = states * point.tangent[-1] - along * point.point[-1]
-    return bool(np.abs(off).max() < SCALES * np.abs(along).max() * abs(point.point[-1]))
 
 
 def is_torus_curve(condition: Condition) -> bool:

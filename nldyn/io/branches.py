@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,13 +32,16 @@ from nldyn.flow.flow_map import FlowMap, Trajectory, same_flow
 from nldyn.flow.kernels.layout import Record
 from nldyn.io.flow import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
 from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute
-from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.shooting import ShootingProblem
 from nldyn.search.diagram import Diagram
 from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
+from nldyn.system.chart import FREQUENCY, Chart, checked_parameter
+from nldyn.system.parameters import Parameter
 
 FORMAT = "nldyn branches"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
+UNKNOWNS = f"{STATE_UNIT}; the last column: logarithm of rad/s, or the parameter's coordinate"
 RECORD_UNITS = {"phase": "rad", "duration": "s", "w": STATE_UNIT, "force": "N", "depth": "m"}
 
 
@@ -129,20 +132,30 @@ def _write(
 
 
 def _write_branch(group: Any, branch: Branch, flows: list[FlowMap]) -> None:
-    problem, observe = branch.nodes[0].orbit.problem, branch.nodes[0].orbit.observe
+    family, observe = branch.nodes[0].family, branch.nodes[0].orbit.observe
+    problem = family.problem
     others = [special.point for special in branch.special_points]
     for point in (*branch.nodes, *others, *branch.requested):
-        mine = point.orbit.problem
+        mine = point.family.problem
         if (
             not same_flow(mine.flow, problem.flow)
             or (mine.period, mine.segments) != (problem.period, problem.segments)
             or point.orbit.observe != observe
+            or point.family.scales != family.scales
         ):
             raise SystemModelError(
                 f"branch '{branch.name}' cannot be saved: its points are of different systems, "
                 "flow maps or shooting problems"
             )
     number = _number_of(problem.flow, flows)
+    chart = family.charts[0]
+    if not family.in_frequency_alone:
+        part = group.create_group("parameter")
+        for key in ("name", "index"):
+            set_attribute(part, key, getattr(chart.parameter, key))
+        for key in ("low", "high", "unit"):
+            set_attribute(part, key, getattr(chart, key))
+        set_attribute(part, "frequency_hz", family.frequency_hz)
     for key, value in {
         "name": branch.name,
         "period": branch.period,
@@ -157,7 +170,7 @@ def _write_branch(group: Any, branch: Branch, flows: list[FlowMap]) -> None:
     special = group.create_group("special_points")
     _write_points(special, others, problem)
     set_attribute(special, "kinds", [s.kind for s in branch.special_points])
-    put(special, "frequency_error", [s.frequency_error for s in branch.special_points], "1")
+    put(special, "root_error", [s.error for s in branch.special_points], "1")
     _write_points(group.create_group("requested"), branch.requested, problem)
     table = group.create_group("table")
     for name, column in orbit_columns(branch.points).items():
@@ -215,8 +228,8 @@ def _write_points(group: Any, points: Sequence[BranchNode], problem: ShootingPro
     def stacked(arrays: Iterable[ArrayLike], *shape: int) -> Real:
         return np.array(list(arrays), dtype=float).reshape(count, *shape)
 
-    unknowns = stacked((orbit.point for orbit in orbits), length)
-    put(group, "point", unknowns, f"{STATE_UNIT}; the last column: logarithm of rad/s")
+    unknowns = stacked((point.point for point in points), length)
+    put(group, "point", unknowns, UNKNOWNS)
     put(group, "tangent", stacked((p.tangent for p in points), length), "as point")
     put(group, "arclength", stacked(p.arclength for p in points), "1")
     jacobians = stacked((o.jacobians for o in orbits), problem.segments, size, size)
@@ -247,13 +260,13 @@ def _record_columns(flow: FlowMap) -> list[tuple[str, NDArray[Any]]]:
 
 
 def _write_course(group: Any, course: Course) -> None:
-    set_attribute(group, "range_hz", course.range_hz)
+    set_attribute(group, "limits", course.limits)
     set_attribute(group, "start", course.start)
     set_attribute(group, "special_points_before", course.special_points_before)
     set_attribute(group, "notes_before", course.notes_before)
     _write_options(group, course.options)
-    put(group, "at", np.array(course.at, dtype=float), "Hz")
-    put(group, "open_ends", course.open_ends, f"{STATE_UNIT}; the last: logarithm of rad/s")
+    put(group, "at", np.array(course.at, dtype=float), "of the parameter")
+    put(group, "open_ends", course.open_ends, UNKNOWNS)
     for name, end_ in zip(("backward", "forward"), course.ends, strict=True):
         if end_ is not None:
             part = group.create_group(name)
@@ -291,13 +304,16 @@ def _read_branch(group: Group, flows: Sequence[FlowMap]) -> Branch:
     observe = group.text("observe")
     if observe not in problem.flow.system.interfaces:
         raise group.fault("attribute", "observe", f"names an unknown interface '{observe}'")
-    nodes = _read_points(group.group("nodes"), problem, observe)
+    family = _read_family(group, problem, observe)
+    nodes = _read_points(group.group("nodes"), family)
     special = group.group("special_points")
-    points = _read_points(special, problem, observe)
+    points = _read_points(special, family)
     kinds = special.texts("kinds")
     if len(kinds) != len(points):
         raise special.fault("attribute", "kinds", f"has {len(kinds)} of {len(points)} entries")
-    errors = special.array("frequency_error", len(points))
+    errors = special.array(
+        "frequency_error" if "frequency_error" in special else "root_error", len(points)
+    )
     reasons = group.texts("stop_reasons")
     if not nodes:
         raise group.fault("group", "nodes", "is empty")
@@ -310,12 +326,36 @@ def _read_branch(group: Group, flows: Sequence[FlowMap]) -> Branch:
         tuple(map(SpecialPoint, kinds, points, errors.tolist())),
         (StopReason(reasons[0]), StopReason(reasons[1])),
         tuple(group.texts("notes")),
-        tuple(_read_points(group.group("requested"), problem, observe)),
+        tuple(_read_points(group.group("requested"), family)),
         _read_course(group.group("course"), nodes) if "course" in group else None,
     )
 
 
-def _read_points(group: Group, problem: ShootingProblem, observe: str) -> list[BranchNode]:
+def _read_family(group: Group, problem: ShootingProblem, observe: str) -> OrbitFamily:
+    """The family of a branch: in the frequency unless another parameter is told."""
+    if "parameter" not in group:
+        at = group.group("nodes").array("point", -1, problem.segments * problem.size + 1)
+        low, high = _limits(group.group("course")) if "course" in group else _octave(at)
+        return OrbitFamily(problem, observe, low, (Chart(Parameter(FREQUENCY), low, high),))
+    part = group.group("parameter")
+    parameter = Parameter(part.text("name"), part.whole("index"))
+    low, high, unit = (part.number(key) for key in ("low", "high", "unit"))
+    chart = Chart(checked_parameter(problem.flow.system, parameter), low, high, unit)
+    return OrbitFamily(problem, observe, part.number("frequency_hz"), (chart,))
+
+
+def _octave(points: Real) -> tuple[float, float]:
+    """Frequencies in Hz about those of some points."""
+    hz = np.exp(points[:, -1]) / (2.0 * math.pi)
+    return 0.5 * float(hz.min(initial=1.0)), 2.0 * float(hz.max(initial=1.0))
+
+
+def _limits(course: Group) -> tuple[float, float]:
+    return course.pair("range_hz" if course.has_attribute("range_hz") else "limits")
+
+
+def _read_points(group: Group, family: OrbitFamily) -> list[BranchNode]:
+    problem = family.problem
     arclength = group.array("arclength", -1)
     count, size = arclength.size, problem.size
     point = group.array("point", count, problem.segments * size + 1)
@@ -325,16 +365,15 @@ def _read_points(group: Group, problem: ShootingProblem, observe: str) -> list[B
     motions = _read_motions(group.group("motion"), count, problem.flow)
     # each in memory of its own, as in the run that computed it: some kernels of BLAS sum in an
     # order that depends on where in memory a vector begins
-    return [
-        BranchNode(
-            Orbit(
-                problem, point[i].copy(), jacobians[i].copy(), float(error[i]), observe, motions[i]
-            ),
-            tangent[i].copy(),
-            float(arclength[i]),
-        )
-        for i in range(count)
-    ]
+    found = []
+    for i in range(count):
+        place = point[i].copy()
+        orbit = family.at(place).orbit_by(jacobians[i].copy(), float(error[i]))
+        if motions[i] is not None:
+            orbit = replace(orbit, motion=motions[i])
+        place = orbit.point if family.in_frequency_alone else place
+        found.append(BranchNode(family, place, orbit, tangent[i].copy(), float(arclength[i])))
+    return found
 
 
 def _read_motions(group: Group, count: int, flow: FlowMap) -> list[Trajectory | None]:
@@ -359,7 +398,7 @@ def _read_motions(group: Group, count: int, flow: FlowMap) -> list[Trajectory | 
 
 
 def _read_course(group: Group, nodes: Sequence[BranchNode]) -> Course:
-    low, high = group.pair("range_hz")
+    low, high = _limits(group)
     start = group.whole("start")
     if not 0 <= start < len(nodes):
         raise group.fault("attribute", "start", f"is {start}, but there are {len(nodes)} points")
@@ -370,7 +409,7 @@ def _read_course(group: Group, nodes: Sequence[BranchNode]) -> Course:
     return Course(
         (low, high),
         _read_options(group),
-        _read_open_ends(group, nodes[0].orbit),
+        _read_open_ends(group, nodes[0].family),
         tuple(group.array("at", -1).tolist()),
         start,
         group.whole("special_points_before"),
@@ -379,11 +418,11 @@ def _read_course(group: Group, nodes: Sequence[BranchNode]) -> Course:
     )
 
 
-def _read_open_ends(group: Group, orbit: Orbit) -> Real:
+def _read_open_ends(group: Group, family: OrbitFamily) -> Real:
     """Where other branches were broken off; version 1 has a dataset for each end."""
     if group.has_group("open_ends"):
-        return alike(orbit, group.group("open_ends").arrays())
-    return group.array("open_ends", -1, orbit.point.size)
+        return alike(family, group.group("open_ends").arrays())
+    return group.array("open_ends", -1, family.n_states + family.n_free)
 
 
 def _read_tally(group: Group) -> Tally | None:

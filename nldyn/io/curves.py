@@ -8,6 +8,7 @@ software may read and this one does not. Datasets carry their unit as the attrib
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,12 +28,13 @@ from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute
 from nldyn.orbits.bordered import Condition, Corrected, Evaluation, Free, OrbitFamily
 from nldyn.orbits.conditions import MONITORS, BranchPointCondition, Grazing, Held, Singular
 from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.shooting import ShootingProblem
+from nldyn.system.chart import FREQUENCY, Chart, checked_parameter
 from nldyn.system.chart import UNITS as PARAMETER_UNITS
-from nldyn.system.chart import Chart, checked_parameter
 from nldyn.system.parameters import Parameter
 
 FORMAT = "nldyn curves"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 POINT_UNIT = f"{STATE_UNIT}; then the parameters' coordinates"
 HELD = 1e-6  # how far the held quantity of a loaded curve may be off
 
@@ -92,6 +94,7 @@ def _write_curve(group: Any, curve: Curve) -> None:
         "notes": curve.notes,
         "corners": [point.corner for point in points],
         "marks": [mark.kind for mark in marks],
+        "in_log_omega": True,
     }.items():
         set_attribute(group, key, value)
     write_flow(group.create_group("flow_map"), FlowMap(family.system, family.options))
@@ -136,7 +139,7 @@ def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
     size = family.n_states + family.n_free
     corners, reasons = group.texts("corners"), group.texts("stop_reasons")
     count = len(corners)
-    points, tangents = group.array("point", count, size), group.array("tangent", count, size)
+    points, tangents = _unknowns(group, "point", family, count), group.array("tangent", count, size)
     lengths, steps = group.array("arclength", count), group.array("step", count)
     conditions = _read_conditions(group, family, count, points, monitor)
     found = [
@@ -155,6 +158,16 @@ def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
     )
 
 
+def _unknowns(group: Group, name: str, family: OrbitFamily, count: int) -> Real:
+    """Unknowns (count, N + m); in version 1 the frequency's coordinate was the logarithm of Hz."""
+    found = group.array(name, count, family.n_states + family.n_free)
+    if not group.has_attribute("in_log_omega"):
+        for place, chart in enumerate(family.charts, family.n_states):
+            if chart.parameter.name == FREQUENCY:
+                found[:, place] += math.log(2.0 * math.pi)
+    return found
+
+
 def _read_family(group: Group, laws: Laws) -> OrbitFamily:
     flow = read_flow(group.group("flow_map"), laws)
     names = group.texts("parameters")
@@ -163,15 +176,8 @@ def _read_family(group: Group, laws: Laws) -> OrbitFamily:
         Chart.of(checked_parameter(flow.system, Parameter(name, int(index))), (low, high))
         for name, (index, low, high) in zip(names, ranges.tolist(), strict=True)
     )
-    family = OrbitFamily(
-        flow.system,
-        flow.options,
-        group.whole("period"),
-        group.whole("segments"),
-        group.text("observe"),
-        group.number("frequency_hz"),
-        charts,
-    )
+    problem = ShootingProblem(flow, group.whole("period"), group.whole("segments"))
+    family = OrbitFamily(problem, group.text("observe"), group.number("frequency_hz"), charts)
     if "unfolding" in group:
         return family.unfolded(group.array("unfolding", family.n_states))
     return family
@@ -182,7 +188,7 @@ def _read_marks(
 ) -> Iterator[LocatedPoint]:
     """The marks, each with the orbit by the condition of the point of the curve nearest to it."""
     kinds = group.texts("marks")
-    places = group.array("mark_point", len(kinds), points.shape[1])
+    places = _unknowns(group, "mark_point", family, len(kinds))
     residuals, errors = (group.array(f"mark_{name}", len(kinds)) for name in ("residual", "error"))
     parameters = tuple(chart.parameter for chart in family.charts)
     numbers = zip(kinds, places, residuals.tolist(), errors.tolist(), strict=True)

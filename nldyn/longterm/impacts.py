@@ -93,9 +93,7 @@ class Impacts:
         if not len(self):
             return "<Impacts: none>"
         largest = self.peak_force.max()
-        hardest = (
-            f"{largest:.4g} N" if np.isfinite(largest) else f"{self.impulse.max():.4g} N s"
-        )
+        hardest = f"{largest:.4g} N" if np.isfinite(largest) else f"{self.impulse.max():.4g} N s"
         return (
             f"<Impacts: {len(self)} from {self.time[0]:.4g} to {self.time[-1]:.4g} s, "
             f"at most {self.speed.max():.4g} m/s and {hardest}>"

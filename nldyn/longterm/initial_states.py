@@ -69,9 +69,7 @@ def state_with(
     return np.concatenate([q, v])
 
 
-def _least(
-    system: System, called: str, given: Mapping[str, float] | None, weight: Real
-) -> Real:
+def _least(system: System, called: str, given: Mapping[str, float] | None, weight: Real) -> Real:
     """The vector x (n,) of least x W x with given values at interfaces, by its multipliers."""
     given = {} if given is None else given
     check_types(**{called: (given, Mapping)})

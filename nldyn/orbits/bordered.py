@@ -19,11 +19,11 @@ from scipy.linalg import solve_triangular
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES, ConvergenceError, SystemModelError
-from nldyn.flow.flow_map import FlowMap, Segments
+from nldyn.flow.flow_map import FlowMap, Segments, Solution, Trajectory
 from nldyn.flow.options import FlowOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.passage import Passage, shoot_past
-from nldyn.orbits.shooting import ITERATIONS, ShootingProblem, metric_length
+from nldyn.orbits.shooting import ITERATIONS, LONGEST, ShootingProblem, metric_length
 from nldyn.system.chart import (
     FREQUENCY,
     Chart,
@@ -59,6 +59,7 @@ CONVERGED = 1e-9  # relative length of a Newton step after which to stop
 SATISFIED = 1e-7  # residual of a condition up to which a solution counts
 CLEAR = 0.2  # of the way to the nearest grazing: a difference that does not reach it
 FAST, STAGNANT = 0.1, 0.3  # rates of Newton's steps: slopes are kept; rounding is all that is left
+SAME_FREQUENCY = 1e-12  # relative, of two that are held alike
 SINGULAR = 1e-14  # least over largest pivot of a Jacobian without a tangent
 SHORTER = 0.2  # of the length that the change would allow: the next difference
 
@@ -69,12 +70,9 @@ class OrbitFamily:
 
     Parameters
     ----------
-    system : System
-        At the start. Its coordinates z are those of the unknowns.
-    options : FlowOptions
-        Accuracy of the flow map.
-    period, segments : int
-        As for `ShootingProblem`.
+    problem : ShootingProblem
+        At the start; its coordinates z are those of the unknowns. Where it begins at a phase other
+        than zero, the unknowns have other states of the orbits than these.
     observe : str
         Interface whose displacement is reported.
     frequency_hz : float
@@ -85,34 +83,19 @@ class OrbitFamily:
         Direction that is added to the shooting equations, times one more unknown.
     passages : tuple of Passage
         Where rigid stops let the motions pass.
-    start : float
-        Forcing phase of the first state, less than a segment's: orbits have it at zero.
     """
 
-    system: System
-    options: FlowOptions
-    period: int
-    segments: int
+    problem: ShootingProblem
     observe: str
     frequency_hz: float
     charts: tuple[Chart, ...]
     unfolding: Real | None = None
     passages: tuple[Passage, ...] = ()
-    start: float = 0.0
 
     @classmethod
     def around(cls, orbit: Orbit, charts: tuple[Chart, ...]) -> OrbitFamily:
         """The family that an orbit belongs to."""
-        problem = orbit.problem
-        return cls(
-            orbit.system,
-            problem.flow.options,
-            problem.period,
-            problem.segments,
-            orbit.observe,
-            orbit.frequency_hz,
-            charts,
-        )
+        return cls(orbit.problem, orbit.observe, orbit.frequency_hz, charts)
 
     @classmethod
     def in_frequency(cls, orbit: Orbit) -> OrbitFamily:
@@ -128,6 +111,56 @@ class OrbitFamily:
         """The family of motions past rigid stops."""
         return self if passages == self.passages else replace(self, passages=passages)
 
+    def shot_from(self, start: float) -> OrbitFamily:
+        """The family by its states at the phases of shooting from a first one on."""
+        return replace(self, problem=replace(self.problem, start=start))
+
+    def repeated(self, times: int) -> OrbitFamily:
+        """The family of the same orbits, run through several times."""
+        if times == 1:
+            return self
+        base = self.problem
+        period, segments = times * base.period, times * base.segments
+        return replace(self, problem=replace(base, period=period, segments=segments))
+
+    @cached_property
+    def halved(self) -> OrbitFamily:
+        """The family of orbits of half the period, on half the segments."""
+        base = self.problem
+        halved = replace(base, period=base.period // 2, segments=base.segments // 2)
+        return replace(self, problem=halved)
+
+    @property
+    def system(self) -> System:
+        """The system at the start."""
+        return self.problem.flow.system
+
+    @property
+    def options(self) -> FlowOptions:
+        """Accuracy of the flow map."""
+        return self.problem.flow.options
+
+    @property
+    def period(self) -> int:
+        """Period multiple n."""
+        return self.problem.period
+
+    @property
+    def segments(self) -> int:
+        """Number k of shooting segments."""
+        return self.problem.segments
+
+    @property
+    def start(self) -> float:
+        """Forcing phase of the first state, less than a segment's: orbits have it at zero."""
+        return self.problem.start
+
+    @cached_property
+    def in_frequency_alone(self) -> bool:
+        """Whether the unknowns are those of an orbit: its states and ln ω."""
+        alone = len(self.charts) == 1 and self.charts[0].parameter.name == FREQUENCY
+        return alone and self.unfolding is None and not (self.passages or self.start)
+
     @property
     def is_exact(self) -> bool:
         """Whether the flow map differentiates by all parameters, so that no differences do."""
@@ -135,10 +168,10 @@ class OrbitFamily:
             has_exact_derivatives(c.parameter) or c.parameter.name == FREQUENCY for c in self.charts
         )
 
-    @property
+    @cached_property
     def n_states(self) -> int:
         """Number N of states, and of shooting equations."""
-        return 2 * self.system.size * self.segments
+        return self.problem.size * self.problem.segments
 
     @property
     def n_free(self) -> int:
@@ -157,12 +190,35 @@ class OrbitFamily:
         here, start = orbit.system.linear, self.system.linear
         if here is not start:  # an orbit of the family has coordinates of its own
             nodes = nodes @ (start.left @ here.right).T
+        if self.in_frequency_alone and here is start:
+            return orbit.point
         point = np.zeros(self.n_states + self.n_free)
         point[: self.n_states] = nodes.ravel()
         for place, chart in enumerate(self.charts, self.n_states):
+            if chart.parameter.name == FREQUENCY:
+                point[place] = orbit.point[-1]
+                continue
             value = value_of(orbit.system, orbit.frequency_hz, chart.parameter)
             point[place] = chart.coordinate(value)
         return point
+
+    @property
+    def scales(self) -> tuple[tuple[Parameter, bool, float], ...]:
+        """The parameters, and on which scale each is followed."""
+        return tuple(chart.scale for chart in self.charts)
+
+    def holds(self, orbit: Orbit) -> bool:
+        """Whether an orbit of the family's period has the frequency that is held, if one is."""
+        if any(moves_frequency(chart.parameter) for chart in self.charts):
+            return True
+        return math.isclose(orbit.frequency_hz, self.frequency_hz, rel_tol=SAME_FREQUENCY)
+
+    def place(self, orbit: Orbit) -> Solved:
+        """An orbit of the family, of the system that the values of its parameters give."""
+        point = self.unknowns(orbit)
+        if not self.in_frequency_alone:
+            orbit = self.at(point).orbit_by(orbit.jacobians, orbit.error)
+        return Solved(self, point, orbit)
 
     def values(self, point: Real) -> Real:
         """Values of the parameters."""
@@ -214,18 +270,26 @@ class Evaluation:
         system = family.system
         for chart, value in zip(family.charts, self.values.tolist(), strict=True):
             system = with_value(system, chart.parameter, value)
-        return ShootingProblem(
-            FlowMap(system, family.options), family.period, family.segments, family.start
-        )
+        if system is family.system:
+            return family.problem
+        return replace(family.problem, flow=FlowMap(system, family.options))
 
     @cached_property
+    def log_omega(self) -> float:
+        """Logarithm of the excitation frequency in rad/s."""
+        hz = self.family.frequency_hz
+        coordinates = self.point[self.family.n_states :].tolist()
+        for chart, coordinate in zip(self.family.charts, coordinates, strict=False):
+            if chart.parameter.name == FREQUENCY:
+                return float(coordinate)
+            if moves_frequency(chart.parameter):
+                hz = chart.value(coordinate)
+        return math.log(2.0 * math.pi * hz)
+
+    @property
     def omega(self) -> float:
         """Excitation frequency in rad/s."""
-        hz = self.family.frequency_hz
-        for chart, value in zip(self.family.charts, self.values.tolist(), strict=True):
-            if moves_frequency(chart.parameter):
-                hz = value
-        return 2.0 * math.pi * hz
+        return math.exp(self.log_omega)
 
     @cached_property
     def change(self) -> tuple[Real, Real] | None:
@@ -270,42 +334,47 @@ class Evaluation:
             gap = gap + self.point[-1] * family.unfolding
         return np.asarray(gap)
 
+    @property
+    def blocks(self) -> Real:
+        """Jacobians (k, 2n, 2n) of the segments, in the coordinates of the family's system."""
+        blocks = self.segments.jacobians
+        return blocks if self.change is None else self.change[1] @ blocks @ self.change[0]
+
+    def by_parameter(self, which: int) -> Real:
+        """Derivatives (k, 2n) of the segments' ends by the coordinate of a parameter."""
+        charts, place = self.family.charts, self.family.n_states + which
+        chart = charts[which]
+        if has_exact_derivatives(chart.parameter):
+            exact = sum(has_exact_derivatives(c.parameter) for c in charts[:which])
+            slope = chart.slope(float(self.point[place]))
+            return slope * self._back(self.segments.d_parameters[:, :, exact])
+        if chart.parameter.name == FREQUENCY:
+            return self.omega * self._back(self.segments.d_omega)
+        return self.difference(place, Evaluation._ends)
+
     @cached_property
     def jacobian(self) -> Real:
         """Derivatives of R, shape (N, N + m)."""
-        family = self.family
+        family, blocks = self.family, self.blocks
         n, k, size = family.n_states, family.segments, 2 * family.system.size
-        blocks = self.segments.jacobians
-        if self.change is not None:
-            blocks = self.change[1] @ blocks @ self.change[0]
         matrix = np.zeros((n, n + family.n_free))
         for j in range(k):
             rows = slice(j * size, (j + 1) * size)
             matrix[rows, rows] += blocks[j]
             after = (j + 1) % k * size
             matrix[rows, after : after + size] -= np.eye(size)
-        exact = 0
-        for place, chart in enumerate(family.charts, n):
-            if has_exact_derivatives(chart.parameter):
-                column = self._back(self.segments.d_parameters[:, :, exact]).ravel()
-                column = column * chart.slope(float(self.point[place]))
-                exact += 1
-            elif chart.parameter.name == FREQUENCY:
-                column = self._back(self.segments.d_omega).ravel()
-                column = column * 2.0 * math.pi * chart.slope(float(self.point[place]))
-            else:
-                column = self._difference(place)
-            matrix[:, place] = column
+        for which in range(len(family.charts)):
+            matrix[:, n + which] = self.by_parameter(which).ravel()
         if family.unfolding is not None:
             matrix[:, -1] = family.unfolding
         return matrix
 
-    def _difference(self, place: int) -> Real:
-        """Derivative of the ends by a parameter, from the maps of two changed systems."""
+    def difference(self, place: int, function: Callable[[Evaluation], Real]) -> Real:
+        """Derivative of a function by a parameter, from two changed systems."""
         step = np.zeros(self.point.size)
         step[place] = self._end_difference
-        before, after, length = _pair(self, step, Evaluation._ends)
-        return np.asarray((after - before).ravel() / (length * self._end_difference))
+        before, after, length = _pair(self, step, function)
+        return np.asarray((after - before) / (length * self._end_difference))
 
     @cached_property
     def _end_difference(self) -> float:
@@ -326,11 +395,14 @@ class Evaluation:
 
     def make_orbit(self, error: float) -> Orbit:
         """The orbit with an estimate of its relative error."""
-        family = self.family
-        if family.start:
+        if self.family.start:
             return self._at_phase_zero().make_orbit(error)
-        point = np.append(self.nodes.ravel(), math.log(self.omega))
-        return Orbit(self.problem, point, self.segments.jacobians, error, family.observe)
+        return self.orbit_by(self.segments.jacobians, error)
+
+    def orbit_by(self, jacobians: Real, error: float) -> Orbit:
+        """The orbit with Jacobians (k, 2n, 2n) that are known."""
+        point = np.append(self.nodes.ravel(), self.log_omega)
+        return Orbit(self.problem, point, jacobians, error, self.family.observe)
 
     def _at_phase_zero(self) -> Evaluation:
         """The same orbit by its states at the phases that orbits have."""
@@ -341,7 +413,7 @@ class Evaluation:
         ]
         point = self.point.copy()
         point[: family.n_states] = np.roll(self._back(np.array(ends)), 1, axis=0).ravel()
-        return Evaluation(replace(family, start=0.0), point)
+        return Evaluation(family.shot_from(0.0), point)
 
 
 def _carried(
@@ -407,6 +479,31 @@ def length_unit(orbit: Orbit) -> float:
     return size * (float(np.linalg.norm(rows, axis=1).max()) if rows.size else 1.0)
 
 
+class Place(Protocol):
+    """An orbit of a family: a point of a branch, or what Newton's method has found."""
+
+    @property
+    def family(self) -> OrbitFamily:
+        """The family."""
+
+    @property
+    def point(self) -> Real:
+        """Its unknowns (N + m,)."""
+
+    @property
+    def orbit(self) -> Orbit:
+        """The orbit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """An orbit of a family that meets a condition; see `Place`."""
+
+    family: OrbitFamily
+    point: Real
+    orbit: Orbit
+
+
 @dataclass(frozen=True, eq=False)
 class Corrected:
     """Outcome of Newton's method.
@@ -423,6 +520,8 @@ class Corrected:
         Number of steps.
     failure : str
         Empty, or why no solution was found.
+    solution : Solution, optional
+        That of the compiled method, if it was used.
     """
 
     at: Evaluation
@@ -430,6 +529,17 @@ class Corrected:
     step: float
     iterations: int
     failure: str
+    solution: Solution | None = None
+
+    @property
+    def family(self) -> OrbitFamily:
+        """Whose orbit was sought."""
+        return self.at.family
+
+    @property
+    def point(self) -> Real:
+        """The last point (N + m,)."""
+        return self.at.point
 
     @cached_property
     def along(self) -> Real:
@@ -440,9 +550,18 @@ class Corrected:
         ConvergenceError
             If the equations have no derivatives there.
         """
+        if self.solution is not None:
+            return self.solution.along
         _, surface = tangent_surface(self.at)
         by_surface = gradient(self.at, surface, self.condition)
         return np.asarray(surface @ np.linalg.svd(by_surface, full_matrices=True)[2][-1])
+
+    def tangent(self, towards: Real) -> Real:
+        """Unit tangent of the curve, on the side of the vector `towards`."""
+        along = self.along
+        weighted = self.family.metric(self.point) * along
+        length = math.sqrt(float(along @ weighted))
+        return along / (length if float(towards @ weighted) >= 0.0 else -length)
 
     @property
     def converged(self) -> bool:
@@ -452,6 +571,8 @@ class Corrected:
     @cached_property
     def orbit(self) -> Orbit:
         """The orbit found."""
+        if self.solution is not None:
+            return Orbit.of(self.family.problem, self.solution, self.family.observe)
         return self.at.make_orbit(self.step)
 
     def residual(self, condition: Condition) -> float:
@@ -462,17 +583,26 @@ class Corrected:
         return max(closing, float(np.abs(condition.value(self.at)).max(initial=0.0)))
 
 
+FREE = Free()
+
+
 def correct(
     family: OrbitFamily,
     guess: Real,
-    condition: Condition,
+    condition: Condition = FREE,
     row: Real | None = None,
-    level: float = 0.0,
+    level: float | None = None,
     *,
     max_iterations: int = ITERATIONS,
-    first_step: float = math.inf,
+    longest: float = math.inf,
+    aim: Real | None = None,
+    like: Trajectory | None = None,
+    closings: int = -1,
+    turn: float = 0.0,
 ) -> Corrected:
     """Newton's method for R = 0, g = 0 and, if a row is given, ``row @ point = level``.
+
+    With `FREE` as condition, orbits in the frequency alone are found by the compiled method.
 
     Parameters
     ----------
@@ -484,17 +614,44 @@ def correct(
         g, with m values, or m - 1 if a row is given.
     row : (N + m,) array, optional
         Normal of a plane.
-    level : float
-        Offset of the plane.
+    level : float, optional
+        Offset of the plane, which leads through the guess unless given.
     max_iterations : int
         Most steps.
-    first_step : float
-        Relative length of the first step, beyond which none is made.
+    longest : float
+        Relative length of the way from `aim` after the first step, beyond which none is made.
+    aim : (N + m,) array, optional
+        The guess unless given.
+    like, closings, turn
+        For the compiled method, see `ShootingProblem.correct`; the other takes no notice.
 
     Returns
     -------
     Corrected
     """
+    if row is not None and level is None:
+        level = float(row @ guess)
+    if row is not None and condition is FREE and family.in_frequency_alone:
+        found = family.problem.correct(
+            guess, row, offset=level, longest=min(longest, LONGEST), max_iterations=max_iterations,
+            like=like, aim=aim, closings=closings, turn=turn,
+        )  # fmt: skip
+        at = Evaluation(family, found.point)
+        return Corrected(at, condition, found.last_step, found.iterations, found.failure, found)
+    return _bordered(family, guess, condition, row, level or 0.0, max_iterations, longest, aim)
+
+
+def _bordered(
+    family: OrbitFamily,
+    guess: Real,
+    condition: Condition,
+    row: Real | None,
+    level: float,
+    max_iterations: int,
+    longest: float,
+    aim: Real | None,
+) -> Corrected:
+    """Newton's method with differences of the condition; see `correct`."""
     point, before, step = guess, math.inf, math.inf
     slopes = None
     for iteration in range(1, max_iterations + 1):
@@ -503,10 +660,13 @@ def correct(
                 slopes = None
             before = step
             change, slopes = _newton_step(family.at(point), condition, slopes, row, level)
-            step = metric_length(family.metric(point), change)
-            if iteration == 1 and step > first_step:
-                raise ConvergenceError("the first step is too long")
+            weights = family.metric(point)
+            step = metric_length(weights, change)
             point = point + change
+            if iteration == 1 and longest < math.inf:
+                way = step if aim is None else metric_length(weights, point - aim)
+                if way > longest:
+                    raise ConvergenceError("the first step is too long")
             if not step < 2.0:
                 raise ConvergenceError("Newton's method diverged")
             if step <= CONVERGED or (step < ROUNDING and step > STAGNANT * before):

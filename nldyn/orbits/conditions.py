@@ -17,6 +17,8 @@ from nldyn.orbits.bordered import (
     Corrected,
     Evaluation,
     OrbitFamily,
+    Place,
+    Solved,
     correct,
     length_unit,
     reach_of_grazing,
@@ -346,30 +348,68 @@ class Grazing:
         phase = float(found.phases[index])
         return phase, exact_output(orbit, self.stop, phase) - orbit.system.stops[self.stop].gap
 
-    def slope(self, orbit: Orbit, phase: float) -> Real:
-        """Derivative (N + 1,) of the depth at a phase with respect to the shooting unknowns."""
-        row = orbit.problem.flow.rows[self.stop]
-        slope = np.zeros(orbit.point.size)
-        states = slope[:-1].reshape(orbit.problem.segments, -1)
-        segment, found = _flown_to(orbit, phase, sensitivities=True)
-        states[segment] = row if found is None else row @ found.jacobians[0]
-        slope[-1] = 0.0 if found is None else orbit.omega * float(row @ found.d_omega[0])
+    def slope(self, place: Place, phase: float) -> Real:
+        """Derivative (N + 1,) of the depth at a phase with respect to the unknowns of a family."""
+        slope = np.zeros(place.point.size)
+        states = slope[:-1].reshape(place.family.segments, -1)
+        segment, row, pace = output_slope(place, self.stop, phase)
+        states[segment] = row
+        slope[-1] = pace
         return slope
 
 
-def depth_row(orbit: Orbit) -> Real | None:
+def depth_row(place: Place) -> Real | None:
     """Derivative (N + 1,) of the depth of a touch beside its grazing point, None without one.
 
     None at a rigid stop, where the depth has no derivative.
     """
     try:
-        touch = Grazing.of(orbit)
+        touch = Grazing.of(place.orbit)
         if touch.half:
             return None
-        phase, depth = touch.extreme(orbit)
-        return touch.slope(orbit, phase) if abs(depth) <= TOUCH * touch.unit else None
+        phase, depth = touch.extreme(place.orbit)
+        return touch.slope(place, phase) if abs(depth) <= TOUCH * touch.unit else None
     except FAILURES:
         return None
+
+
+def output_slope(place: Place, output: int, phase: float) -> tuple[int, Real, float]:
+    """Derivatives of an output at a phase, of a stop's that of the depth.
+
+    Returns
+    -------
+    segment, row, pace : int, (2n,), float
+        The segment of the phase, the derivative by its unknowns and that by the parameter.
+    """
+    family, orbit = place.family, place.orbit
+    if not family.in_frequency_alone:
+        return _output_slope_by_parameter(place, output, phase)
+    flow = orbit.problem.flow
+    row = flow.rows[output]
+    carried = float(flow.ride(output, orbit.omega).by_log_omega(np.array(phase)))
+    segment, found = _flown_to(orbit, phase, sensitivities=True)
+    if found is None:
+        return segment, row, carried
+    by_omega = orbit.omega * float(row @ found.d_omega[0])
+    return segment, row @ found.jacobians[0], by_omega + carried
+
+
+def _output_slope_by_parameter(place: Place, output: int, phase: float) -> tuple[int, Real, float]:
+    """The same for a parameter other than the frequency, whose part is a difference."""
+    at = place.family.at(place.point)
+    segment, found = _flown_to(place.orbit, phase, sensitivities=True)
+    row = place.orbit.problem.flow.rows[output]
+    row = row if found is None else row @ found.jacobians[0]
+    if at.change is not None:
+        row = row @ at.change[0]
+
+    def depth(at: Evaluation) -> Real:
+        value = exact_output(at.orbit, output, phase)
+        stops = at.problem.flow.system.stops
+        return np.array([value - stops[output].gap if output < len(stops) else value])
+
+    pace = at.difference(place.point.size - 1, depth)
+    return segment, row, float(pace[0])
 
 
 def exact_output(orbit: Orbit, output: int, phase: float) -> float:
@@ -604,7 +644,7 @@ class Held:
         return self
 
 
-def nearest_crossing(orbit: Orbit, first_step: float = math.inf) -> tuple[Orbit, float] | None:
+def nearest_crossing(place: Place, longest: float = math.inf) -> tuple[Solved, float] | None:
     """The crossing of branches beside an orbit, and its unfolding relative to the orbit.
 
     The unfolding is what must be added to the shooting equations for branches to cross: zero, but
@@ -615,36 +655,31 @@ def nearest_crossing(orbit: Orbit, first_step: float = math.inf) -> tuple[Orbit,
     ----------
     G. Moore (1980), *Numer. Funct. Anal. Optim.* 2, 441-472.
     """
-    found = _beside("BP", orbit, first_step)
+    found = _beside("BP", place, longest)
     if found is None:
         return None
-    return replace(found.orbit, problem=orbit.problem), abs(float(found.at.point[-1]))
+    return Solved(place.family, found.point[:-1], found.orbit), abs(float(found.point[-1]))
 
 
-def nearest_flip(orbit: Orbit) -> Orbit | None:
+def nearest_flip(place: Place) -> Solved | None:
     """The flip of the branch of an orbit, if it has one beside it."""
-    found = _beside("PD", orbit)
-    return None if found is None else replace(found.orbit, problem=orbit.problem)
+    found = _beside("PD", place)
+    return None if found is None else Solved(place.family, found.point, found.orbit)
 
 
-def nearest_grazing(orbit: Orbit) -> Orbit | None:
-    """The grazing beside an orbit, by its defining system; without the slight impact."""
-    found = grazing_beside(orbit, OrbitFamily.in_frequency(orbit))
-    return None if found is None else replace(found.orbit, problem=orbit.problem)
-
-
-def grazing_beside(orbit: Orbit, family: OrbitFamily) -> Corrected | None:
+def grazing_beside(place: Place) -> Corrected | None:
     """The grazing of a rigid stop in a family with one parameter, without the slight impact.
 
     Where several touches graze at once, without any of these.
     """
+    orbit = place.orbit
     try:
         alone = Grazing.of(orbit)
         together = alone.with_others(orbit)
     except SystemModelError:
         return None
     for grazing in (together, alone) if together.others else (alone,):
-        found = _solved(orbit, family.past(grazing.passages), grazing)
+        found = _solved(orbit, place.family.past(grazing.passages), grazing)
         if found is None:
             continue
         try:
@@ -655,25 +690,25 @@ def grazing_beside(orbit: Orbit, family: OrbitFamily) -> Corrected | None:
     return None
 
 
-def _beside(kind: str, orbit: Orbit, first_step: float = math.inf) -> Corrected | None:
+def _beside(kind: str, place: Place, longest: float = math.inf) -> Corrected | None:
     """The special point of a kind beside an orbit."""
     try:
-        family, condition = defined_by(kind, OrbitFamily.in_frequency(orbit), orbit)
+        family, condition = defined_by(kind, place.family, place.orbit)
     except FAILURES:
         return None
-    return _solved(orbit, family, condition, first_step)
+    return _solved(place.orbit, family, condition, longest)
 
 
 def _solved(
-    orbit: Orbit, family: OrbitFamily, condition: Condition, first_step: float = math.inf
+    orbit: Orbit, family: OrbitFamily, condition: Condition, longest: float = math.inf
 ) -> Corrected | None:
     """What meets a condition beside an orbit, in the family in which that is solved."""
     try:
         guess = family.unknowns(orbit)
-        found = correct(family, guess, condition, first_step=first_step)
+        found = correct(family, guess, condition, longest=longest)
     except FAILURES:
         return None
-    apart = metric_length(family.metric(guess), found.at.point - guess)
+    apart = metric_length(family.metric(guess), found.point - guess)
     farthest = BESIDE if family.is_exact else BESIDE_BY_DIFFERENCES
     return found if found.converged and apart <= farthest else None
 

@@ -23,6 +23,7 @@ MOST_SEGMENTS = 10**5
 
 TOLERANCE = 1e-11  # relative length of a Newton step after which to stop
 ITERATIONS = 12  # most Newton steps
+LONGEST = 1e3  # relative length of a first Newton step
 FROM_NEAR = 8  # the same from a point that was predicted or nearly found: more mean it went astray
 LOOSE = 1e-3  # relative length of a last step from which on nothing shows that there is an orbit
 AT_REST = 1e-6  # size of an orbit, relative to the guess, that may be rounding
@@ -98,7 +99,7 @@ class ShootingProblem:
         row: Real,
         *,
         offset: float | None = None,
-        longest: float = 1e3,
+        longest: float = LONGEST,
         max_iterations: int = ITERATIONS,
         like: Trajectory | None = None,
         aim: Real | None = None,

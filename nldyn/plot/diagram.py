@@ -19,12 +19,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
-from nldyn.base.errors import check_choice, check_types
+from nldyn.base.errors import SystemModelError, check_choice, check_types
 from nldyn.branches.branch import check_branches
 from nldyn.plot.hover import show_labels
 from nldyn.plot.words import ANGLES, LENGTHS, displacement_of, units_of
 from nldyn.runtime.progress import in_notebook
+from nldyn.system.chart import FREQUENCY, label_of, parameter_name, told_value
 from nldyn.system.naming import stop_name
+from nldyn.system.parameters import Parameter
 from nldyn.system.rigid_stop import AnyStop
 
 if TYPE_CHECKING:
@@ -113,18 +115,18 @@ def branch_curve(
 
     Returns
     -------
-    frequency_hz, max_abs_displacement, stable : (n,) arrays
-        In Hz and m, in the order along the branch. A special point counts as stable if a
-        neighbour is, so that the drawn stability changes at the special point itself.
+    values, max_abs_displacement, stable : (n,) arrays
+        The parameter's values (Hz for the frequency) and m, in the order along the branch. A
+        special point counts as stable if a neighbour is, so that the drawn stability changes at the
+        special point itself.
     """
-    located = [(node.arclength, node.orbit, node.orbit.stable) for node in branch.nodes]
+    located = [(node, node.orbit.stable) for node in branch.nodes]
     for special in branch.special_points:
-        stable = beside_stable(branch, special)
-        located.append((special.point.arclength, special.orbit, stable))
-    located.sort(key=lambda entry: entry[0])
-    hz = np.array([orbit.frequency_hz for _, orbit, _ in located], dtype=float)
-    y = np.array([orbit.max_abs_displacement for _, orbit, _ in located], dtype=float)
-    return hz, y, np.array([stable for _, _, stable in located], dtype=bool)
+        located.append((special.point, beside_stable(branch, special)))
+    located.sort(key=lambda entry: entry[0].arclength)
+    x = np.array([node.value for node, _ in located], dtype=float)
+    y = np.array([node.orbit.max_abs_displacement for node, _ in located], dtype=float)
+    return x, y, np.array([stable for _, stable in located], dtype=bool)
 
 
 def beside_stable(branch: Branch, special: SpecialPoint) -> bool:
@@ -261,6 +263,7 @@ def plot_diagram(
     check_branches("diagram", branches)
     check_types(ax=(ax, Axes, None), special_points=(special_points, Sequence))
     check_choice("yscale", yscale, ("linear", "log"))
+    parameter = followed_parameter(branches)
     for kind in special_points:
         check_choice("special_points", kind, MARKERS)
     ax = ax if ax is not None else new_axes()
@@ -272,18 +275,35 @@ def plot_diagram(
     size = mark_size(sum(len(points) for points in marked.values()))
     for kind, points in marked.items():
         _draw_marks(ax, points, kind, factor, size)
-    ax.set_xlabel("excitation frequency (Hz)")
+    in_frequency = parameter.name == FREQUENCY
+    ax.set_xlabel("excitation frequency (Hz)" if in_frequency else label_of(parameter))
     observed = observed_interface(branches)
     ax.set_ylabel(f"largest {displacement_of(observed, direction)} ({unit})")
     ax.set_yscale(yscale)
     if yscale == "linear":
         ax.set_ylim(bottom=-0.02 * ax.get_ylim()[1])
+    references = references and in_frequency
     lines = draw_references(ax, branches, factor, unit) if references and observed else []
     if legend and branches:
         draw_legend(ax, colours, branches, marked, lines)
     if hover:
         _label_orbits(ax, branches, marked, factor, unit)
     return ax
+
+
+def followed_parameter(branches: Sequence[Branch]) -> Parameter:
+    """The parameter in which some branches were followed, the frequency if there are none.
+
+    Raises
+    ------
+    SystemModelError
+        If they were followed in several.
+    """
+    parameters = list(dict.fromkeys(branch.parameter for branch in branches))
+    if len(parameters) > 1:
+        names = ", ".join(map(parameter_name, parameters))
+        raise SystemModelError(f"the branches were followed in different parameters: {names}")
+    return parameters[0] if parameters else Parameter(FREQUENCY)
 
 
 def observed_interface(branches: Sequence[Branch]) -> str:
@@ -457,19 +477,19 @@ def period_colours(periods: Iterable[int]) -> dict[int, str]:
 
 
 def _draw_branch(ax: Axes, branch: Branch, colour: str, factor: float) -> None:
-    hz, y, stable = branch_curve(branch)
+    x, y, stable = branch_curve(branch)
     for run in stability_runs(stable):
         part = slice(run.start, run.stop)
         style = STABLE if run.stable else UNSTABLE
-        ax.plot(hz[part], y[part] / factor, color=colour, linewidth=1.4, linestyle=style)
+        ax.plot(x[part], y[part] / factor, color=colour, linewidth=1.4, linestyle=style)
 
 
 def _draw_marks(
     ax: Axes, points: Sequence[SpecialPoint], kind: str, factor: float, size: float
 ) -> None:
-    hz = [float(point.orbit.frequency_hz) for point in points]
+    x = [float(point.value) for point in points]
     y = [float(point.orbit.max_abs_displacement) / factor for point in points]
-    ax.plot(hz, y, **mark_style(kind, size))
+    ax.plot(x, y, **mark_style(kind, size))
 
 
 def mark_style(kind: str, size: float = 4.5) -> dict[str, Any]:
@@ -496,22 +516,25 @@ def _label_orbits(
 ) -> None:
     """Let special points, which come first, and points show what they are."""
     entries = [
-        (branch.name, f"{MARKER_NAMES[special.kind]} ({special.kind})", special.orbit)
+        (branch.name, f"{MARKER_NAMES[special.kind]} ({special.kind})", special.point)
         for branch in branches
         for special in branch.special_points
         if special.kind in marked
     ]
     count = len(entries)  # at the special points stability changes
     entries += [
-        (branch.name, f"point {number}", orbit)
+        (branch.name, f"point {number}", node)
         for branch in branches
-        for number, orbit in enumerate(branch.points)
+        for number, node in enumerate(branch.nodes)
     ]
-    places = [(orbit.frequency_hz, orbit.max_abs_displacement / factor) for _, _, orbit in entries]
+    places = [(node.value, node.orbit.max_abs_displacement / factor) for _, _, node in entries]
 
     def label(index: int) -> str:
-        name, what, orbit = entries[index]
+        name, what, node = entries[index]
+        orbit = node.orbit
         title = f"{name or period_name(orbit.period)}, {what}"
+        if node.parameter.name != FREQUENCY:
+            title += f"\n{told_value(node.parameter, node.value, digits=7)}"
         return f"{title}\n{orbit_text(orbit, factor, unit, stability=index >= count)}"
 
     show_labels(ax, np.array(places, dtype=float).reshape(-1, 2), label)

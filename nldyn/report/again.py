@@ -164,7 +164,7 @@ def as_diagram(found: object) -> Diagram:
         return found
     if not isinstance(found, list) or not all(isinstance(each, Branch) for each in found):
         raise SystemModelError("the results hold no branches")
-    spans = [branch.course.range_hz if branch.course else branch.span_hz for branch in found]
+    spans = [branch.course.limits if branch.course else branch.span_hz for branch in found]
     lowest = min((low for low, _ in spans), default=0.0)
     highest = max((high for _, high in spans), default=0.0)
     observe = found[0].points[0].observe if found else ""

@@ -188,6 +188,11 @@ class ToldPoint:
     orbit: ToldOrbit
     arclength: float
 
+    @property
+    def value(self) -> float:
+        """That of the frequency, in which a diagram is drawn."""
+        return self.orbit.frequency_hz
+
 
 @dataclass(frozen=True)
 class ToldSpecial:

@@ -313,9 +313,9 @@ def of_number(what: str) -> Callable[[ProgressLine], Callable[[int, int], None]]
     return lambda line: line.counted(what)
 
 
-def of_frequency(what: str) -> Callable[[ProgressLine], Callable[[float], None]]:
-    """For `shows_progress`: what tells the frequency in Hz that it is at."""
-    return lambda line: lambda hz: line(what, hz, math.nan)
+def of_value(what: str) -> Callable[[ProgressLine], Callable[[float], None]]:
+    """For `shows_progress`: what tells the value of the parameter that it is at."""
+    return lambda line: lambda value: line(f"{what} at {value:.6g}", 0.0, math.nan)
 
 
 def of_place(what: str) -> Callable[[ProgressLine], Callable[..., None]]:

@@ -30,11 +30,14 @@ from nldyn.branches.endings import Ending
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.prefetch import Ahead, Task
+from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.orbit import Orbit, minimal_period, stroboscopic
 from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import orbit_near
 from nldyn.runtime.progress import Progress
 from nldyn.search.outlook import Outlook
+from nldyn.system.chart import FREQUENCY, Chart
+from nldyn.system.parameters import Parameter
 
 
 @dataclass
@@ -58,6 +61,10 @@ class Collector:
     starts: dict[int, tuple[SpecialPoint, BranchNode | LocateError]] = field(
         default_factory=dict
     )  # of the branches born at flips, by the flips' ids
+
+    def _family_of(self, orbit: Orbit) -> OrbitFamily:
+        """The family of an orbit over the range."""
+        return OrbitFamily.around(orbit, (Chart(Parameter(FREQUENCY), *self.range_hz),))
 
     def tell(self, what: str, frequency_hz: float) -> None:
         """Say what is being computed."""
@@ -92,17 +99,17 @@ class Collector:
     def _keep(self, branch: Branch) -> None:
         self.branches.append(branch)
         for end in open_ends(branch):
-            self._open_ends_like(branch.nodes[0].orbit).add(end)
+            self._open_ends_like(branch.nodes[0]).add(end)
         ends = zip(branch.stop_reasons, (branch.nodes[0], branch.nodes[-1]), strict=True)
         self.flip_ends += [node.orbit for reason, node in ends if reason.ending is Ending.JOINS]
 
-    def _open_ends_like(self, orbit: Orbit) -> Rows:
+    def _open_ends_like(self, node: BranchNode) -> Rows:
         """Where branches were broken off at orbits of as many periods and unknowns as this one.
 
         What lies beyond is followed up to there.
         """
-        like = orbit.period, orbit.point.size
-        return self.open_ends.setdefault(like, Rows(orbit.point.size))
+        like = node.family.period, node.point.size
+        return self.open_ends.setdefault(like, Rows(node.point.size))
 
     def take(self, branches: Iterable[Branch], notes: Iterable[str]) -> None:
         """Take branches that are known, with their names; see `follow_up`."""
@@ -139,7 +146,7 @@ class Collector:
             if self.known(orbit):
                 continue
             try:
-                start = start_point(orbit, 1.0, self.range_hz)
+                start = start_point(self._family_of(orbit).place(orbit), 1.0)
             except ConvergenceError as error:
                 self.notes.append(f"orbit of period {orbit.period} found but not followed: {error}")
             else:
@@ -151,7 +158,7 @@ class Collector:
             return
         for orbit in orbits:
             try:
-                start = start_point(orbit, 1.0, self.range_hz)
+                start = start_point(self._family_of(orbit).place(orbit), 1.0)
             except ConvergenceError:
                 continue
             if not self.known(start.orbit):
@@ -184,7 +191,7 @@ class Collector:
         return self.starts[id(special)][1]
 
     def _course(self, start: BranchNode, options: ContinuationOptions | None) -> Course:
-        ends = self._open_ends_like(start.orbit).so_far()
+        ends = self._open_ends_like(start).so_far()
         return Course(self.range_hz, options or self.options, ends)
 
     def _is_within(self, orbit: Orbit) -> bool:
@@ -235,7 +242,7 @@ class Collector:
                 observe=orbit.observe,
                 segments=orbit.problem.segments,
             )
-            start = start_point(image, 1.0, self.range_hz)
+            start = start_point(self._family_of(image).place(image), 1.0)
         except ConvergenceError as error:
             self.notes.append(f"the mirror image of branch {branch.name} was not found: {error}")
         else:
@@ -301,7 +308,7 @@ class Collector:
         group = "period", start.orbit.period
         progress(start.orbit.frequency_hz)
         ahead.take(group, leg_key(start, course))
-        branch = self.checkpoint.branch_from(start.orbit, course)
+        branch = self.checkpoint.branch_from(start, course)
         if branch is not None:
             branch = extended(branch, progress=progress, checkpoint=self.checkpoint)
         else:

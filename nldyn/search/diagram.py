@@ -41,7 +41,9 @@ from nldyn.runtime.progress import Progress, shows_progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.collector import Collector, counted
 from nldyn.search.outlook import Outlook
+from nldyn.system.chart import FREQUENCY
 from nldyn.system.equilibrium import at_rest, rest
+from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
 if TYPE_CHECKING:
@@ -178,7 +180,12 @@ def check_known(known: Diagram, flow: FlowMap) -> None:
             raise SystemModelError(
                 f"known: branch '{branch.name}' is of another system or accuracy"
             )
-        a, b = branch.course.range_hz if branch.course else (low, high)
+        if branch.parameter.name != FREQUENCY:
+            raise SystemModelError(
+                f"known: branch '{branch.name}' was followed in {branch.parameter.name}, not in "
+                "the frequency"
+            )
+        a, b = branch.course.limits if branch.course else (low, high)
         if not a <= low < high <= b:
             raise SystemModelError(
                 f"known: branch '{branch.name}' was followed from {a:g} to {b:g} Hz, not over the "
@@ -289,7 +296,9 @@ def diagram(
         options or ContinuationOptions(),
         progress or silent,
     )
-    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, (low, high))
+    box.checkpoint = checkpoint_of_several(
+        checkpoint, box.branches, flow, (low, high), Parameter(FREQUENCY)
+    )
     with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
         effort, whole = _effort(box, search, search_points, wanted)
         box.outlook = Outlook(wanted, search_points if wanted else 0, len(seeds))

@@ -26,6 +26,8 @@ from nldyn.search.collector import Collector, counted, middle_orbit
 from nldyn.search.diagram import Diagram, check_known
 from nldyn.search.exploration import check_spacing, steps_between
 from nldyn.search.fixed_point_index import index_note, is_damped, without_index_note
+from nldyn.system.chart import FREQUENCY
+from nldyn.system.parameters import Parameter
 
 PLACES = 6  # orbits of a branch near a frequency
 WINDOW = 0.03  # relative distance within which frequencies are near
@@ -338,7 +340,9 @@ def collector_beside(
     low, high = known.range_hz
     box = Collector(own, (low, high), known.observe, options, progress)
     box.take(known.branches, without_index_note(known.notes))
-    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, own, box.range_hz)
+    box.checkpoint = checkpoint_of_several(
+        checkpoint, box.branches, own, box.range_hz, Parameter(FREQUENCY)
+    )
     return box
 
 

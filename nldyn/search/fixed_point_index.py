@@ -158,7 +158,7 @@ def _checked(
     if not branches:
         raise SystemModelError(f"{caller}: branches must not be empty")
     for branch in branches:
-        a, b = branch.course.range_hz if branch.course else (0.0, math.inf)
+        a, b = branch.course.limits if branch.course else (0.0, math.inf)
         if not a * (1.0 - SAME) <= low <= high <= b * (1.0 + SAME):
             asked = f"{low:g}" if low == high else f"{low:g} to {high:g}"
             raise SystemModelError(
@@ -209,7 +209,7 @@ def _along(branch: Branch, times: int) -> tuple[Real, NDArray[np.int_]]:
         best = i if clear[i] >= clear[i + 1] else i + 1
         signs.append(index(places[best].orbit, times) if clear[best] > CLEAR else 0)
     _fill(signs, kinds)
-    return np.array([place.orbit.point[-1] for place in places]), np.array(signs, dtype=int)
+    return np.array([place.point[-1] for place in places]), np.array(signs, dtype=int)
 
 
 def _fill(signs: list[int], kinds: Sequence[str]) -> None:

@@ -120,6 +120,40 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     return parameter
 
 
+def told_value(parameter: Parameter, *values: float, digits: int = 6) -> str:
+    """Values of a parameter in words, with their unit; the frequency without its name.
+
+    Examples
+    --------
+    >>> told_value(Parameter(FREQUENCY), 23.5), told_value(Parameter("gap", 1), 2e-5)
+    ('23.5 Hz', 'gap_1 = 2e-05 m')
+    """
+    unit = UNITS[parameter.name]
+    numbers = " and ".join(dict.fromkeys(f"{value:.{digits}g}" for value in values))
+    number = numbers if unit == "1" else f"{numbers} {unit}"
+    if parameter.name == FREQUENCY:
+        return number
+    return f"{parameter_name(parameter)} = {number}"
+
+
+def parameter_name(parameter: Parameter) -> str:
+    """Name of a parameter, with its number where that is not 0: ``gap_1``."""
+    return f"{parameter.name}_{parameter.index}" if parameter.index else parameter.name
+
+
+def label_of(parameter: Parameter) -> str:
+    """Name of a parameter with its unit, for an axis or the head of a column.
+
+    Examples
+    --------
+    >>> label_of(Parameter(FREQUENCY)), label_of(Parameter("gap"))
+    ('frequency (Hz)', 'gap (m)')
+    """
+    unit = UNITS[parameter.name]
+    words = parameter_name(parameter).removesuffix("_hz").replace("_", " ")
+    return words if unit == "1" else f"{words} ({unit})"
+
+
 def moves_frequency(parameter: Parameter) -> bool:
     """Whether a parameter is, or goes with, the excitation frequency."""
     return parameter.name in (FREQUENCY, SPEED)
@@ -257,7 +291,7 @@ class Chart:
     """A parameter on the scale on which it is followed.
 
     A positive range is followed in the logarithm of the value, so that a step of 0.1 is 10 % of
-    it; any other range in units of its width.
+    it; any other range in units of its width. The excitation frequency is followed in ln ω.
 
     Parameters
     ----------
@@ -265,11 +299,14 @@ class Chart:
         What is followed.
     low, high : float
         Values between which to stay.
+    unit : float
+        What counts as 1 where the value itself is followed; the width of the range unless given.
     """
 
     parameter: Parameter
     low: float
     high: float
+    unit: float = 0.0
 
     @classmethod
     def of(cls, parameter: Parameter, limits: tuple[float, float]) -> Chart:
@@ -308,6 +345,13 @@ class Chart:
             )
         return cls(parameter, float(low), float(high))
 
+    @property
+    def range_name(self) -> str:
+        """How messages call the range."""
+        if self.parameter.name == FREQUENCY:
+            return "range_hz"
+        return f"the range of {parameter_name(self.parameter)}"
+
     def check_start(self, value: float) -> None:
         """Refuse a start outside the range."""
         slack = SLACK * max(abs(self.low), abs(self.high))
@@ -320,15 +364,48 @@ class Chart:
     @property
     def logarithmic(self) -> bool:
         """Whether the logarithm is followed."""
-        return self.low > 0.0
+        return self.low > 0.0 and not self.unit
+
+    @property
+    def _width(self) -> float:
+        return self.unit or self.high - self.low
+
+    @property
+    def scale(self) -> tuple[Parameter, bool, float]:
+        """The parameter, whether its logarithm is followed, and else what counts as 1."""
+        linear = not (self.logarithmic or self.parameter.name == FREQUENCY)
+        return self.parameter, not linear, self._width if linear else 0.0
+
+    def over(self, limits: tuple[float, float]) -> Chart:
+        """The same scale over another range.
+
+        Raises
+        ------
+        SystemModelError
+            If the parameter cannot have these values, or the scale is that of the logarithm, which
+            does not reach down to zero.
+        """
+        wanted = Chart.of(self.parameter, limits)
+        if not self.logarithmic:
+            return replace(wanted, unit=self._width)
+        if not wanted.logarithmic:
+            raise SystemModelError(
+                f"{self.range_name} was followed on a logarithmic scale, which does not reach "
+                f"{wanted.low:g}: begin anew with a range that does"
+            )
+        return wanted
 
     def coordinate(self, value: float) -> float:
         """Coordinate of a value."""
-        return math.log(value) if self.logarithmic else value / (self.high - self.low)
+        if self.parameter.name == FREQUENCY:
+            return math.log(2.0 * math.pi * value)
+        return math.log(value) if self.logarithmic else value / self._width
 
     def value(self, coordinate: float) -> float:
         """Value at a coordinate; rounding does not carry it past an end of the range."""
-        value = math.exp(coordinate) if self.logarithmic else coordinate * (self.high - self.low)
+        value = math.exp(coordinate) if self.logarithmic else coordinate * self._width
+        if self.parameter.name == FREQUENCY:
+            value /= 2.0 * math.pi
         for end in (self.low, self.high):
             if abs(value - end) <= LAST_DIGIT * max(abs(self.low), abs(self.high)):
                 return end
@@ -336,4 +413,6 @@ class Chart:
 
     def slope(self, coordinate: float) -> float:
         """Derivative of the value with respect to the coordinate."""
-        return math.exp(coordinate) if self.logarithmic else self.high - self.low
+        if self.parameter.name == FREQUENCY:
+            return math.exp(coordinate) / (2.0 * math.pi)
+        return math.exp(coordinate) if self.logarithmic else self._width

@@ -169,9 +169,9 @@ def test_numbers_of_a_parameter_are_checked():
     check_named(said, "Parameter: index must be a whole number")
 
 
-@pytest.mark.parametrize("name", ["start", "range_hz", "at", "options", "progress", "name"])
+@pytest.mark.parametrize("name", ["start", "limits", "at", "options", "progress", "name"])
 def test_arguments_of_a_continuation_are_named(name, orbit):
-    good = {"start": orbit, "range_hz": (25.0, 27.0)}
+    good = {"start": orbit, "limits": (25.0, 27.0)}
     junk = {
         "options": [x for x in JUNK if x is not None],
         "progress": [x for x in JUNK if x is not None],
@@ -179,7 +179,7 @@ def test_arguments_of_a_continuation_are_named(name, orbit):
         "at": ["nonsense", math.nan, -1.0, [None], [math.nan], [-26.0], ["26"], [99.0], 26.0],
     }.get(name, JUNK)
     said = refused(lambda value: continue_branch(**{**good, name: value}), *junk)
-    check_named(said, name)
+    check_named(said, "range" if name == "limits" else name)
 
 
 def test_sizes_of_steps_off_a_branch_are_checked(flip):
@@ -304,7 +304,7 @@ def test_ranges_in_which_there_are_no_systems_are_refused(orbit):
 def test_places_of_which_the_branches_do_not_tell_are_refused(harmonic_branch, flip):
     check_named(refused(lambda x: index_sum([harmonic_branch], x), 2.0, 200.0), "was followed from")
     check_named(refused(lambda x: index_sum(x, 26.0), []), "branches must not be empty")
-    check_named(refused(lambda x: cascade(flip, 2, range_hz=x), (1.0, 2.0)), "lies outside range")
+    check_named(refused(lambda x: cascade(flip, 2, limits=x), (1.0, 2.0)), "lies outside range")
 
 
 @pytest.mark.parametrize("name", ["period", "segments"])
@@ -358,5 +358,5 @@ def test_element_that_a_system_does_not_have_is_told_apart_from_none_at_all():
     ):
         with pytest.raises(SystemModelError, match=told):
             continue_orbit(orbit, Parameter(name, index), (1.0, 2.0))
-    with pytest.raises(SystemModelError, match="continue_branch: an orbit needs a range_hz"):
+    with pytest.raises(SystemModelError, match="continue_branch: an orbit needs a range"):
         continue_branch(orbit, None)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from problems import make_one_dof, torus_system
+from problems import in_frequency, make_one_dof, torus_system
 
 from nldyn import (
     HarmonicForce,
@@ -231,7 +231,7 @@ def beside(special, q, size):
 @pytest.mark.parametrize("index", range(6))
 def test_fold_bends_as_its_coefficient_says(harmonic_branch, index):
     special = of_kind(harmonic_branch, "LP")[index]
-    form, q = fold(loop_of(special.orbit))
+    form, q = fold(loop_of(special.point))
     told = normal_form(special)
     size = min(1e-3 / abs(form.nonlinear.value), 1e-3)
     sides = [beside(special, q, s * size) for s in (1.0, -1.0)]
@@ -306,7 +306,7 @@ def test_coefficients_do_not_depend_on_the_segments(harmonic_branch, segments):
     nodes = problem.flow.to_state(orbit.states(phases))
     again = refine(problem, nodes, orbit.omega, orbit.observe)
     invariants = []
-    for loop in (loop_of(orbit), loop_of(again)):
+    for loop in (loop_of(special.point), loop_of(in_frequency(again))):
         form, q = flip(loop)
         unit = np.linalg.norm(q[0])
         invariants.append([form.nonlinear.value / unit**2, form.slope.value])
@@ -339,7 +339,7 @@ def torus_points():
 def torus_radius2(special, shift, periods=3000):
     """Mean |ξ|² of a simulation at the frequency f₀(1 + shift) that starts on the torus."""
     orbit, told = special.orbit, normal_form(special)
-    loop = loop_of(orbit)
+    loop = loop_of(special.point)
     mu = max(orbit.multipliers, key=lambda value: value.imag)
     q, y = loop.critical(mu / abs(mu))
     adjoint = mu / abs(mu) * y[-1]  # at the first node
@@ -575,7 +575,7 @@ def test_ratios_of_a_cascade_tend_to_feigenbaums_number(damped_cascade):
 def test_flips_of_a_cascade_lie_before_its_limit(damped_cascade):
     hz = [s.frequency_hz for s in damped_cascade.flips]
     assert hz == sorted(hz)
-    assert hz[-1] < damped_cascade.limit_hz < hz[-1] + 0.5 * (hz[-1] - hz[-2])
+    assert hz[-1] < damped_cascade.limit < hz[-1] + 0.5 * (hz[-1] - hz[-2])
     for branch, start in zip(damped_cascade.branches, damped_cascade.flips, strict=False):
         assert branch.period == 2 * start.orbit.period
         assert branch.points[0].stable
@@ -623,7 +623,7 @@ def test_cascade_ends_where_the_doubled_branch_comes_back():
     found = cascade(min(of_kind(branch, "PD"), key=lambda s: s.frequency_hz), 2)
     assert len(found.flips) == 1
     assert f"joins the branch of period 1 at the flip at {high:.6g} Hz" in found.stop_reason
-    assert low < high and not found.ratios and math.isnan(found.limit_hz)
+    assert low < high and not found.ratios and math.isnan(found.limit)
 
 
 def test_cascade_needs_a_flip(harmonic_branch):

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from independent import Motion
-from problems import RANGE_HZ, make_one_dof, torus_system
+from problems import RANGE_HZ, in_frequency, make_one_dof, torus_system
 from scipy.optimize import minimize_scalar
 
 from nldyn import (
@@ -27,7 +27,6 @@ from nldyn import (
 from nldyn.base.errors import LocateError
 from nldyn.base.resources import example
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.continuation import start_point
@@ -161,9 +160,10 @@ def test_flip_that_is_not_found_leaves_no_point_twice(harmonic_branch, monkeypat
     def fails(*_, **__):
         raise ConvergenceError("no orbit")
 
-    monkeypatch.setattr("nldyn.bifurcations.period_doubling.refine", fails)
     flip = next(f for f in flips(harmonic_branch) if 8.0 < f.frequency_hz < 11.0)
-    nodes, _, reason, _ = trace(switch_at_flip(flip), (5.7, 90.0))
+    start = switch_at_flip(flip)
+    monkeypatch.setattr("nldyn.bifurcations.period_doubling.correct", fails)
+    nodes, _, reason, _ = trace(start, (5.7, 90.0))
     assert reason.startswith("meets the branch of period 1 beyond 10.4")
     assert np.all(np.diff([node.arclength for node in nodes]) > 0.0)
 
@@ -360,7 +360,7 @@ def test_torus_test_changes_sign_where_a_pair_leaves_the_circle(angle):
 
 
 def test_walk_can_be_stopped_between_two_points_and_taken_up_again(one_dof):
-    start = start_point(solve_orbit(one_dof, 45.0), 1.0, RANGE_HZ)
+    start = start_point(in_frequency(solve_orbit(one_dof, 45.0)), 1.0)
     walk = Stepper(start, (40.0, 60.0), ContinuationOptions())
     some = list(itertools.islice(walk, 4))
     assert [p.arclength for p in some] == sorted(p.arclength for p in some)
@@ -441,7 +441,7 @@ def test_no_special_points_between_the_same_two_points_in_either_direction(harmo
     nodes = harmonic_branch.nodes
     i = next(k for k, n in enumerate(nodes) if n.arclength > flip.point.arclength)
     forward = special_points_between(nodes[i - 1], nodes[i])
-    there, here = (BranchNode(n.orbit, -n.tangent, -n.arclength) for n in nodes[i - 1 : i + 1])
+    there, here = (node.reversed() for node in nodes[i - 1 : i + 1])
     backward = special_points_between(here, there)
     assert [s.kind for s in forward] == [s.kind for s in backward] == ["PD"]
     assert forward[0].frequency_hz == pytest.approx(backward[0].frequency_hz, rel=1e-9)

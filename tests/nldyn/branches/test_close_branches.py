@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from hard.continuation import beam as four_modes
-from problems import between_stops, make_one_dof
+from problems import between_stops, in_frequency, make_one_dof
 from test_uncoupled import oscillator
 
 from nldyn import (
@@ -324,11 +324,15 @@ def test_a_half_begun_beside_its_pitchfork_has_that_once_and_no_fold(facing, amp
 def test_a_tangent_that_jumps_beside_a_pitchfork_tells_of_that_and_of_no_fold(facing, monkeypatch):
     """It may be steeper where it is of both branches than at a tenth of the step farther on."""
     pitchfork = [s for s in facing.special_points if s.kind == "BP"][1]
-    half = switch_at_branch_point(pitchfork, 5e-6)[0].orbit
-    branch = continue_branch(half, (0.99 * pitchfork.frequency_hz, 1.01 * pitchfork.frequency_hz))
-    far = next(o for o in branch.points if 5e-3 < distance(half, o) < 5e-2)
+    half = switch_at_branch_point(pitchfork, 5e-6)[0]
+    branch = continue_branch(
+        half.orbit, (0.99 * pitchfork.frequency_hz, 1.01 * pitchfork.frequency_hz)
+    )
+    far = next(o for o in branch.nodes if 5e-3 < distance(half, o) < 5e-2)
     secant, length = far.point - half.point, distance(half, far)
-    first, last = (BranchNode(o, secant / length, s) for o, s in ((half, 0.0), (far, length)))
+    first, last = (
+        BranchNode.of(place, secant / length, s) for place, s in ((half, 0.0), (far, length))
+    )
     tests = special.tests
 
     def mixed(point):
@@ -426,18 +430,18 @@ def test_only_orbits_beside_a_crossing_lie_on_it():
     """Not beside a fold, and not where the branches of an imperfect pitchfork come close."""
     symmetric = continue_branch(solve_orbit(between_stops(), 11.0), (11.0, 11.8))
     pitchfork = next(s for s in symmetric.special_points if s.kind == "BP")
-    assert lies_on_crossing(pitchfork.orbit, 1e-8)
+    assert lies_on_crossing(pitchfork.point, 1e-8)
     (beside,) = symmetric.at(pitchfork.frequency_hz * (1.0 + 1e-7))
-    assert lies_on_crossing(beside, 3e-7)
-    assert not lies_on_crossing(beside, 1e-7)
+    assert lies_on_crossing(in_frequency(beside), 3e-7)
+    assert not lies_on_crossing(in_frequency(beside), 1e-7)
     (near,) = continue_branch(solve_orbit(between_stops(1e-6), 11.0), (11.0, 11.4)).at(
         pitchfork.frequency_hz
     )
-    assert not lies_on_crossing(near, 1.0)
+    assert not lies_on_crossing(in_frequency(near), 1.0)
     bent = make_one_dof(stops=[Stop("middle", stiffness=5.17e9, gap=2e-6)])
     resonance = continue_branch(solve_orbit(bent, 15.0), (15.0, 30.0))
     fold = next(s for s in resonance.special_points if s.kind == "LP")
-    assert not lies_on_crossing(fold.orbit, 1.0)
+    assert not lies_on_crossing(fold.point, 1.0)
 
 
 @pytest.mark.parametrize("beyond", [0.0, 2e-8, -2e-8])
@@ -535,7 +539,7 @@ def test_neimark_sacker_points_in_a_small_part_of_a_step_are_found(before_hz):
         way = orbit.point - points[-1].orbit.point if points else np.zeros(orbit.point.size)
         length = metric_length(orbit.problem.metric(orbit.point), way)
         arclength = points[-1].arclength + length if points else 0.0
-        points.append(replace(start_point(orbit, -1.0, (54.0, 55.0)), arclength=arclength))
+        points.append(replace(start_point(in_frequency(orbit), -1.0), arclength=arclength))
     z, a, b, c = points
     found = special_points_between(a, b, z, c)
     walked = [s for s in branch.special_points if 54.6851172 < s.frequency_hz < 54.6987555]

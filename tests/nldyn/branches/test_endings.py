@@ -11,7 +11,8 @@ from nldyn.branches.endings import Ending, StopReason
 
 GAPS = {
     "period": "2",
-    "hz": "8.71",
+    "place": "8.71 Hz",
+    "what": "frequencies",
     "points": "100",
     "step": "1e-05",
     "obstacle": "Newton's method: no convergence",

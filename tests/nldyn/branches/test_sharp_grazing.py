@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from problems import in_frequency
 from scipy.optimize import brentq
 
 from nldyn import HarmonicForce, Stop, System, continue_branch, solve_orbit
@@ -73,7 +74,7 @@ def grazing_orbit(system: System, hz: float):
 
 def test_slope_of_the_depth_of_a_touch_is_that_of_its_differences():
     orbit = grazing_orbit(near_resonance(1e6), 25.4)
-    touch, row = Grazing.of(orbit), depth_row(orbit)
+    touch, row = Grazing.of(orbit), depth_row(in_frequency(orbit))
     problem, rng = orbit.problem, np.random.default_rng(3)
     for _ in range(5):
         way = rng.normal(size=row.size) / np.sqrt(problem.metric(orbit.point))
@@ -88,7 +89,7 @@ def _moved(orbit, way):
 
 
 def test_no_depth_row_where_no_stop_is_grazed():
-    assert depth_row(solve_orbit(near_resonance(1e6), 50.0)) is None
+    assert depth_row(in_frequency(solve_orbit(near_resonance(1e6), 50.0))) is None
 
 
 @pytest.mark.parametrize("depth", [1e-12, 1e-11, 1e-10, 2e-10, 1e-9, 1e-8])
@@ -103,7 +104,7 @@ def test_slight_touch_during_another_contact_is_counted(depth):
         excitation=[HarmonicForce("b", 1.131)],
     )  # fmt: skip
     orbit = grazing_orbit(system, 10.5)
-    row, point = depth_row(orbit), orbit.point.copy()
+    row, point = depth_row(in_frequency(orbit)), orbit.point.copy()
     point[:-1] += depth * row[:-1] / float(row[:-1] @ row[:-1])
     problem = orbit.problem
     nodes = problem.nodes(point)

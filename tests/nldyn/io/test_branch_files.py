@@ -293,7 +293,7 @@ def test_whatever_is_missing_is_named(saved, copy):
         ("nodes/error", lambda x: x.astype(np.float32), "float32"),
         ("nodes/jacobians", lambda x: np.array(["a"] * len(x), dtype="S1"), "has shape"),
         ("nodes/motion/kind", lambda x: x.astype(float), "float64"),
-        ("special_points/frequency_error", lambda x: np.zeros(99), "has shape"),
+        ("special_points/root_error", lambda x: np.zeros(99), "has shape"),
     ],
 )
 def test_wrong_shape_or_type_is_named(copy, place, change, words):

@@ -159,8 +159,8 @@ def test_walk_meets_an_open_end_whatever_the_shift_of_the_orbit(one_dof):
 
 
 def test_diagram_says_which_orbit_it_could_not_follow(monkeypatch):
-    def fails(orbit, *_, **__):
-        raise ConvergenceError(f"no orbit at {orbit.frequency_hz:g} Hz: singular Jacobian")
+    def fails(place, *_, **__):
+        raise ConvergenceError(f"no orbit at {place.orbit.frequency_hz:g} Hz: singular Jacobian")
 
     monkeypatch.setattr("nldyn.search.collector.start_point", fails)
     found = diagram(make_one_dof(stops=[]), (25.0, 27.0), periods=(1,), search_points=1)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from problems import in_frequency
 
 import nldyn
 from nldyn import BaseMotion, SceneError, Stop, System, SystemModelError
 from nldyn.base.resources import example
-from nldyn.bifurcations.normal_forms import output_change
-from nldyn.orbits.conditions import max_abs_displacement
+from nldyn.orbits.conditions import max_abs_displacement, output_slope
 from nldyn.orbits.harmonics import modal_row
 from nldyn.scene.backbone import undamped
 from nldyn.scene.build import build_system
@@ -87,8 +87,7 @@ def test_the_derivative_by_the_frequency_is_that_of_the_closed_form():
     orbit = nldyn.solve_orbit(shaken(base), HZ)
     extremes = orbit.observed_extremes
     phase = float(extremes.phases[0])
-    still = np.zeros((orbit.problem.segments, 2))
-    _, along = output_change(orbit, 0, phase, still)
+    segment, row, along = output_slope(in_frequency(orbit), 0, phase)
     nodes = (
         np.linalg.inv(np.eye(2) - orbit.monodromy)
         @ orbit.problem.flow.shoot(
@@ -96,7 +95,8 @@ def test_the_derivative_by_the_frequency_is_that_of_the_closed_form():
         ).d_omega[0]
         * orbit.omega
     )
-    moved, _ = output_change(orbit, 0, phase, np.array([nodes]))
+    assert segment == 0
+    moved = float(row @ nodes)
     h = 1e-5
 
     def absolute(omega):
