@@ -118,10 +118,10 @@ def read_nastran(
             f"{path}: is no Nastran bulk data with elements that have a shape (CQUAD4, CBAR,"
             " CTETRA, ...); give masses and springs alone as [matrices] in the scene"
         )
-    mark_turning(gathered)
-    read_points(gathered, factor)
+    equations = mark_turning(gathered)
     read_matrices(gathered)
-    read_rigid(gathered)
+    read_points(gathered, factor)
+    read_rigid(gathered, equations)
     twist_rods(gathered, rods)
     read_supports(gathered)
     _name_analysis_set(gathered)

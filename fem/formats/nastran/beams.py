@@ -135,7 +135,7 @@ def _part(card: Card, numbers: BeamNumbers, law: Isotropic, lines: _Lines) -> Be
     start, angle = _section(card, numbers, 0, factor)
     end, _ = _section(card, numbers, 1, factor)
     density = law.density + 2.0 * float(np.mean(numbers.added)) / (start.area + end.area)
-    sheared = any(numbers.shear)
+    sheared = any(numbers.shear) and G > 0.0
     heights, offsets = [], []
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     for span, y, w in zip(lines.spans, lines.heights, lines.offsets, strict=True):
@@ -162,15 +162,16 @@ def _section(card: Card, numbers: BeamNumbers, end: int, factor: float) -> tuple
         mean, half = (first + second) / 2.0, np.hypot((first - second) / 2.0, mixed)
         first, second = mean + half, mean - half
     polar = first + second
-    first, second, torsion = (value or LEAST * polar for value in (first, second, torsion))
+    numbered = (first, second, factor * torsion)
+    first, second, torsion = (value or LEAST * polar for value in numbered)
     named = {"A": area, "I1": first, "I2": second, "J": torsion}
     wrong = [name for name, value in named.items() if not value > 0.0]
     if wrong:
         raise card.fail(f"its {' and '.join(wrong)} must be positive for a beam; write it as CROD")
     areas: list[float | None] = [None, None]
-    if any(numbers.shear):
+    if any(numbers.shear) and factor:
         areas = [factor * area * (k or RIGID) for k in numbers.shear]
-    return Section(area, first, second, factor * torsion, *areas), angle
+    return Section(area, first, second, torsion, *areas), angle
 
 
 def _once(values: FloatArray) -> Any:

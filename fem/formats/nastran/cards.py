@@ -230,7 +230,8 @@ def cards_of(lines: Sequence[Line], source: Path) -> Iterator[Card]:
 
 
 def _alike(first: str, mark: str) -> bool:
-    return first[1:].upper() == mark[1:].upper()
+    """Whether two marks are one from the second column on; that of a card may begin there."""
+    return first[1:].upper() in (mark[1:].upper(), mark.upper())
 
 
 def _fields(line: str) -> tuple[str, list[str], list[str]]:

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 
 from fem.formats.nastran.cards import Line
 
-CHOICES = ("SPC", "MPC", "K2GG", "M2GG", "B2GG", "K2PP", "M2PP", "B2PP")
+CHOICES = ("SPC", "MPC", "K2GG", "M2GG", "B2GG", "K2PP", "M2PP", "B2PP", "AUTOSPC")
 BEGIN = re.compile(r"\s*BEGIN(\s+BULK|\s*$|\s+\w+\s*=)", re.IGNORECASE)
+PARAM = re.compile(r"\s*PARAM\s*,", re.IGNORECASE)
+"""A card that may stand before the bulk data, too."""
 SUPER = re.compile(r"\s*BEGIN\s+(BULK\s+)?(SUPER|AUXMODEL)\s*=", re.IGNORECASE)
 
 
@@ -44,7 +46,8 @@ def divided(lines: Sequence[Line]) -> tuple[Control, list[Line], list[Line]]:
     if starts:
         for line in lines[: starts[0]]:
             _read(control, line.text)
-        bulk = list(lines[starts[0] + 1 :])
+        parameters = [line for line in lines[: starts[0]] if PARAM.match(line.text)]
+        bulk = [*parameters, *lines[starts[0] + 1 :]]
     other = [line for line in lines if SUPER.match(line.text)]
     return control, bulk, other
 
@@ -55,11 +58,8 @@ def _read(control: Control, text: str) -> None:
     if found is None:
         return
     name = found[1].upper()
-    full = next(
-        (c for c in CHOICES if name == c or (c == "TEMPERATURE" and name[:4] == "TEMP")), ""
-    )
-    if full:
-        values = control.chosen.setdefault(full, [])
+    if name in CHOICES:
+        values = control.chosen.setdefault(name, [])
         value = found[2].strip().upper()
         if value not in values:
             values.append(value)

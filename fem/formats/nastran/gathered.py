@@ -154,8 +154,9 @@ class Gathered:
         )
 
     def _autospc(self) -> bool:
-        cards = [card for card in self.deck.of("PARAM") if card.text(0) == "AUTOSPC"]
-        return not (cards and cards[-1].text(1) in ("NO", "N"))
+        words = [card.text(1) for card in self.deck.of("PARAM") if card.text(0) == "AUTOSPC"]
+        words += filter(None, [self.deck.control.first("AUTOSPC")])
+        return words[-1:] not in (["NO"], ["N"])
 
     def content(self) -> meshio.Mesh:
         """The mesh as meshio has it."""

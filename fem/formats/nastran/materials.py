@@ -85,22 +85,29 @@ class Materials:
         E, G, nu = (card.real(at) if card.text(at) else None for at in (1, 2, 3))
         if E is None and G is None:
             raise card.fail("has neither E nor G")
-        if nu is None:
-            nu = 0.0 if not E or not G else E / (2.0 * G) - 1.0
-        if E is None:
+        if nu is None:  # of three numbers one follows from two; alone, the other two are 0
+            nu = E / (2.0 * G) - 1.0 if E and G else 0.0
+            E, G = E or 0.0, G or 0.0
+        elif E is None:
             assert G is not None
             E = 2.0 * (1.0 + nu) * G
-        if G is None:
+        elif G is None:
             G = E / (2.0 * (1.0 + nu))
         if not E > 0.0:
             raise card.fail(f"its Young's modulus is {E:g} and must be positive")
         return Isotropic(E, G, nu, self.factor * card.real(4))
 
+    def _resisting_shear(self, card: Card) -> Isotropic:
+        law = self._isotropic(card)
+        if not law.shear_modulus > 0.0:
+            raise card.fail("its G is 0 (Nastran takes G and NU as 0 if both are blank); give NU")
+        return law
+
     def plane(self, number: int, card: Card) -> Isotropic | Plane:
         """The material of a plate: MAT1, MAT2 or MAT8."""
         own = self._card(number, card)
         if own.name == "MAT1":
-            return self._isotropic(own)
+            return self._resisting_shear(own)
         self._tell_of_unused(own)
         if own.name == "MAT2":
             g11, g12, g13, g22, g23, g33 = own.reals(1, 6)
@@ -124,8 +131,10 @@ class Materials:
     def solid(self, number: int, card: Card) -> Isotropic | Spatial:
         """The material of a solid: MAT1 or MAT9."""
         own = self._card(number, card)
+        if own.name == "MAT1":
+            return self._resisting_shear(own)
         if own.name != "MAT9":
-            return self.isotropic(number, card)
+            raise card.fail(f"needs a MAT1 or MAT9, but material {number} is {own.name}")
         self._tell_of_unused(own)
         law = np.zeros((6, 6))
         law[np.triu_indices(6)] = own.reals(1, 21)

@@ -182,7 +182,8 @@ def _read_bush(gathered: Gathered, card: Card) -> None:
     first, second = card.whole(2), card.whole(3, 0)
     ends = [first] + ([second] if second else [])
     places = [gathered.deck.place(grid, card) for grid in ends]
-    axes = _bush_axes(gathered, card, places)
+    across = any(each[i] != each[i + 1] for each in (stiffness, damping) for i in (1, 4))
+    axes = _bush_axes(gathered, card, places, across)
     centre = _bush_centre(gathered, card, places)
     for grid, place in zip(ends, places, strict=True):
         if (stiffness[3:].any() or damping[3:].any()) or np.linalg.norm(centre - place) > 0.0:
@@ -223,8 +224,13 @@ def _bush_numbers(card: Card) -> dict[str, FloatArray]:
     return found
 
 
-def _bush_axes(gathered: Gathered, card: Card, places: list[FloatArray]) -> FloatArray:
-    """Axes as rows: of a system, or along the line of the grid points and an orientation."""
+def _bush_axes(
+    gathered: Gathered, card: Card, places: list[FloatArray], across: bool
+) -> FloatArray:
+    """Axes as rows: of a system, or along the line of the grid points and an orientation.
+
+    Without `across` every orientation is the same.
+    """
     systems = gathered.deck.systems
     if card.text(7):
         return systems.system(card.whole(7), card).axes_at(places[0])
@@ -236,6 +242,8 @@ def _bush_axes(gathered: Gathered, card: Card, places: list[FloatArray]) -> Floa
         v = gathered.deck.place(card.whole(4), card) - places[0]
     elif any(card.text(at) for at in (4, 5, 6)):
         v = np.array(card.reals(4, 3)) @ gathered.deck.axes(card.whole(2))
+    elif across:
+        raise card.fail("acts across its line and needs an orientation (G0, X) or a system (CID)")
     else:
         v = np.eye(3)[np.argmin(np.abs(x))]
     z = np.cross(x, v)

@@ -17,18 +17,33 @@ ALIGNED = 1e10  # condition of the moments of an averaging element, from which i
 NAMES = ("RBE2", "RBAR", "RBE3", "RROD")
 
 
-def mark_turning(gathered: Gathered) -> None:
-    """Note the grid points that rigid elements turn, before anything is attached to them."""
-    for card in gathered.deck.of("RBE2"):
+def mark_turning(gathered: Gathered) -> frozenset[int]:
+    """Note the grid points that are turned, before anything is attached to them.
+
+    Returns
+    -------
+    frozenset of int
+        The sets of equations (MPC) that hold.
+    """
+    deck = gathered.deck
+    for card in deck.of("RBE2"):
         gathered.turns.add(card.whole(1))
-    for card in gathered.deck.of("RBAR"):
+        if max(card.components(2)) > 3:
+            gathered.turns.update(deck.grids.keys() & set(_slaves(card)))
+    for card in deck.of("RBAR"):
         gathered.turns.update([card.whole(1), card.whole(2)])
-    for card in gathered.deck.of("RBE3"):
+    for card in deck.of("RBE3"):
         gathered.turns.add(card.whole(2))
+    sets = chosen_sets(deck, "MPC", "MPCADD", "MPC")
+    for card in deck.of("MPC"):
+        if card.whole(0) in sets:
+            turned = [grid for grid, component, _ in _forms(gathered, card) if component > 3]
+            gathered.turns.update(turned)
+    return sets
 
 
-def read_rigid(gathered: Gathered) -> None:
-    """Read all rigid elements, and the equations of the set that case control chooses."""
+def read_rigid(gathered: Gathered, sets: frozenset[int]) -> None:
+    """Read all rigid elements, and the equations of the sets that hold."""
     for card in gathered.deck.of("RBE2"):
         gathered.add_element(card)
         _read_rbe2(gathered, card)
@@ -41,7 +56,6 @@ def read_rigid(gathered: Gathered) -> None:
     for card in gathered.deck.of("RBE3"):
         gathered.add_element(card)
         _read_rbe3(gathered, card)
-    sets = chosen_sets(gathered.deck, "MPC", "MPCADD", "MPC")
     for card in gathered.deck.of("MPC"):
         if card.whole(0) in sets:
             _read_mpc(gathered, card)
@@ -86,14 +100,19 @@ def _follow(gathered: Gathered, card: Card, master: int, slave: int, components:
         _equation(gathered, card, terms + _row(gathered, card, master, row @ motion, -1.0))
 
 
+def _slaves(card: Card) -> list[int]:
+    """The dependent grid points of RBE2, without the number of expansion that may end it."""
+    while card.fields and not card.fields[-1]:
+        card.fields.pop()
+    last = len(card.fields) - card.is_real(len(card.fields) - 1)
+    return Card(card.name, card.fields[:last], card.line, card.source).wholes(3)
+
+
 def _read_rbe2(gathered: Gathered, card: Card) -> None:
     """Grid points that follow the first one; a real number at the end is of expansion."""
-    master, components = card.whole(1), card.components(2)
-    while card.fields and (not card.fields[-1] or card.is_real(len(card.fields) - 1)):
-        if card.fields[-1]:
-            gathered.deck.leave_out("expansion of RBE2", card.place, "it is not used")
-        card.fields.pop()
-    slaves = card.wholes(3)
+    master, components, slaves = card.whole(1), card.components(2), _slaves(card)
+    if card.is_real(len(card.fields) - 1):
+        gathered.deck.leave_out("expansion of RBE2", card.place, "it is not used")
     if not slaves:
         raise card.fail("has no dependent grid point")
     spread = "THRU" in card.texts(3)
@@ -203,17 +222,22 @@ def _weighted(card: Card) -> list[tuple[float, list[int], list[int]]]:
 
 
 def _read_mpc(gathered: Gathered, card: Card) -> None:
-    """A linear equation; two terms a line, after a blank field in all but the first."""
+    """A linear equation between directions of grid points."""
     terms: list[Term] = []
-    for start in range(0, len(card.fields), 8):
-        for at in (start + 1, start + 4):
-            if not card.text(at):
-                continue
-            grid, value = card.whole(at), card.real(at + 2)
-            component = 1 if grid in gathered.deck.scalars else card.components(at + 1)[0]
-            if not gathered.has(grid, component):
-                gathered.turns.add(grid)
-            terms += gathered.terms(card, grid, component, value)
+    for grid, component, value in _forms(gathered, card):
+        terms += gathered.terms(card, grid, component, value)
     if not terms:
         raise card.fail("has no terms")
     _equation(gathered, card, terms)
+
+
+def _forms(gathered: Gathered, card: Card) -> list[tuple[int, int, float]]:
+    """Grid point, direction and factor; two a line, after a blank field in all but the first."""
+    found = []
+    for start in range(0, len(card.fields), 8):
+        for at in (start + 1, start + 4):
+            if card.text(at):
+                grid, value = card.whole(at), card.real(at + 2)
+                component = 1 if grid in gathered.deck.scalars else card.components(at + 1)[0]
+                found.append((grid, component, value))
+    return found

@@ -113,6 +113,10 @@ def _pbeam(deck: Deck, card: Card, mass_factor: float) -> BeamNumbers:
     shear = (card.real(8 * row, 1.0), card.real(8 * row + 1, 1.0))
     if any(card.real(8 * row + i) for i in (6, 7)):
         deck.leave_out("warping of PBEAM", card.place, "beams warp freely")
+    if any(card.real(8 * row + i) for i in (2, 3)):
+        deck.leave_out("shear relief of PBEAM", card.place, "shear is that of a straight beam")
+    if any(card.real(8 * row + i) for i in (4, 5)):
+        deck.leave_out("inertia NSI of PBEAM", card.place, "give it as CONM2 where it matters")
     axis = [(card.real(8 * row + at), card.real(8 * row + at + 1)) for at in (12, 14)]
     if not (card.text(8 * row + 14) or card.text(8 * row + 15)):
         axis[1] = axis[0]

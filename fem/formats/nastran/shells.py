@@ -36,7 +36,7 @@ FIELDS = {
     "CTRIA3": _Fields("triangle", 3, 3, 5, 6, 10, 9),
     "CTRIAR": _Fields("triangle", 3, 3, 5, 6, 10, 9),
     "CQUAD8": _Fields("quad8", 8, 4, 14, 15, 10, 16),
-    "CTRIA6": _Fields("triangle6", 6, 3, 8, 9, 10, 16),
+    "CTRIA6": _Fields("triangle6", 6, 3, 8, 9, 10, 13),
 }
 FIRST_ORDER = {"quad8": "quad", "triangle6": "triangle", "quad": "quad", "triangle": "triangle"}
 PROPERTIES = ("PSHELL", "PCOMP", "PCOMPG")

@@ -129,6 +129,15 @@ def test_cards_of_analyses_and_unused_systems_change_nothing(tmp_path):
     ]
 
 
+def test_marks_of_continuations_are_compared_from_the_second_column_on(tmp_path):
+    """Field 10 is " +000001" and the next line begins with "++000001"."""
+    path = tmp_path / "brick.bdf"
+    text = BRICK.replace("PSOLID,2,1", f"PSOLID  2       1{'':55} +000001\n++000001")
+    assert "++000001" in text
+    path.write_text(text)
+    assert fem.read_structure(path).described["PSOLID 2"]["made"]
+
+
 def test_cards_to_ignore_are_left_out(tmp_path):
     path = tmp_path / "brick.bdf"
     path.write_text(BRICK.replace("PARAM", "CGAP,9,1,1,2\nPGAP,1\nPARAM", 1))

@@ -107,6 +107,18 @@ def test_rods_stretch_and_twist(tmp_path):
     assert twisted.stiffness.toarray()[own, own] == pytest.approx(2 * G * 1e-9 + G * 3e-9)
 
 
+def test_a_modulus_alone_gives_no_shear_modulus(tmp_path):
+    """As Nastran has it: neither torsion nor shear deformation, and the bending of E."""
+    prop = "PBAR,7,9,1.-4,2.-9,1.-9,1.-9\n,,,,,,,,\n,.8,.8\nMAT1,9,2.+11,,,8000.\n"
+    found = component(tmp_path, cantilever("CBAR", prop))
+    expected = CLAMPED**2 / (2 * np.pi) * np.sqrt(2e11 * np.array([1e-9, 2e-9]) / 0.8)
+    section = found.model.parts["PBAR 7"].section
+    assert section.torsion_constant < 1e-11 * section.second_moment
+    bending = lowest(found, 10)
+    for one in expected:
+        assert np.abs(bending / one - 1.0).min() < 1e-4
+
+
 DIMENSIONS = {
     "ROD": (0.03,), "TUBE": (0.03, 0.02), "TUBE2": (0.03, 0.01), "BAR": (0.02, 0.05),
     "BOX": (0.06, 0.08, 0.006, 0.004), "BOX1": (0.06, 0.08, 0.006, 0.008, 0.004, 0.002),

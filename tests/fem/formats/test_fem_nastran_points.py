@@ -78,6 +78,7 @@ def test_coordinate_systems_stand_in_chains(tmp_path):
         ("CELAS1,9,5,1,1\n", "CELAS1: names the property 5, which is not defined"),
         ("CBUSH,9,5,1,2\n", "CBUSH: names the property PBUSH 5, which is not defined"),
         ("PBUSH,5,K,1.\nCBUSH,9,5,1\n", r"CBUSH: has no length, so it needs a .* \(CID\)"),
+        ("PBUSH,5,K,1.,2.\nCBUSH,9,5,1,2\n", "CBUSH: acts across its line and needs an orient"),
         ("SPC1,1,7,1\n", "SPC1: '7' in field 4 are not directions out of 1 to 6|'7' in field 3"),
         ("RBE3,9,,1,123456,1.,123,2,3\n", "RBE3: its grid points do not determine all six"),
         ("RBAR,9,1,2,123,123456\n", "RBAR: its independent directions .* are not six"),
@@ -129,6 +130,12 @@ def test_case_control_chooses_supports_and_all_else_is_told(tmp_path):
          "CELAS2,11,16.,20,6\n", [2.0]),
         ("GRID,31,,7.,5.,5.\nRBAR,9,20,31,123456\nCONM2,10,31,,1.\nSPC1,1,12345,20\n"
          "CELAS2,11,16.,20,6\n", [2.0]),
+        # a body at the end of that lever turns with it, and so does what an equation ties to it
+        ("GRID,31,,7.,5.,5.\nRBE2,9,20,123456,31\nCONM2,10,31,,1.\n,12.,,12.,,,12.\n"
+         "SPC1,1,12345,20\nCELAS2,11,64.,20,6\n", [2.0]),
+        ("GRID,31,,7.,5.,5.\nRBE2,9,20,123456,31\nCONM2,10,31,,1.\nSPC1,1,12345,20\n"
+         "CELAS2,11,52.,20,6\nGRID,40,,5.,5.,5.\nSPC1,1,23,40\nCONM2,12,40,,1.\n"
+         "MPC,4,40,1,-1.,31,6,3.\n", [2.0]),
         # the mean of two masses, one on a spring each, moves a third: (k1 + k2)/(m + 4 m3/4)
         ("GRID,31,,6.,5.,5.\nSPC1,1,23,20,31\nMPC,4,40,1,-2.,20,1,1.\n,,31,1,1.\n"
          "GRID,40,,5.5,5.,5.\nSPC1,1,23,40\nCONM2,10,40,,4.\nCELAS2,11,8.,20,1\n"
@@ -207,6 +214,14 @@ def test_dampers_of_all_kinds_make_one_damping_matrix(tmp_path):
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
+def test_parameters_may_stand_in_case_control(tmp_path):
+    halved = assembled(read(tmp_path, "", " param, wtmass, .5"))
+    assert halved.rigid_mass[0, 0] == pytest.approx(4000.0)
+    rigid = "RBE2,9,1,123456,2\n"
+    assert read(tmp_path, rigid).attachments.loose
+    assert not read(tmp_path, rigid, "AUTOSPC(NOPRINT) = NO").attachments.loose
+
+
 def test_the_analysis_set_is_a_set_of_points(tmp_path):
     mesh = read(tmp_path, "ASET,1,3,5,123\nASET1,123,7,THRU,8\n")
     assert mesh.nodes("ASET").tolist() == [0, 4, 6, 7]
@@ -237,6 +252,12 @@ def test_matrices_that_case_control_names_are_added(tmp_path):
     expected = np.linalg.eigvalsh([[8.0, -2.0], [-2.0, 5.0]]) / 2.0
     np.testing.assert_allclose((2 * np.pi * hz(assembled(mesh))) ** 2, expected, rtol=1e-9)
     assert any(item.keyword == "DMIG OTHER" for item in mesh.left_out)
+    turning = (
+        "GRID,20,,5.,5.,5.\nCONM2,9,20,,,\n,2.,,2.,,,2.\nSPC1,1,12356,20\n"
+        "DMIG,TURN,0,6,1\nDMIG,TURN,20,4,,20,4,8.\n"
+    )
+    mesh = read(tmp_path, turning + HELD, "SPC = 1\nK2GG = TURN")
+    np.testing.assert_allclose(2 * np.pi * hz(assembled(mesh)), [2.0], rtol=1e-9)
     with pytest.raises(fem.ModelError, match="K2GG = NONE: there is no DMIG 'NONE'"):
         read(tmp_path, cards, "K2GG = NONE")
     bad = "DMIG,MASS,0,1,1\nDMIG,MASS,1,1,,2,1,2.\n"

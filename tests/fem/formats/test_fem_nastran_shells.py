@@ -108,6 +108,9 @@ def test_elements_with_own_thickness_offset_and_direction_are_parts_of_their_own
     assert parts["PSHELL 3 (3)"].thickness == pytest.approx(0.03)
     assert parts["PCOMP 4"].direction == 30.0
     np.testing.assert_allclose(parts["PCOMP 4 (2)"].direction, [0.5**0.5, 0.5**0.5, 0], atol=1e-8)
+    relative = "CTRIA6,1,3,1,2,3,5,6,9\n,,,1.5,1.5,1.5,1\nGRID,9,,.5,.5,0.\nPSHELL,3,1,.01,1,,1\n"
+    (part,) = fem.parts_of(read(tmp_path, relative)).values()
+    assert part.thickness == pytest.approx(0.015)
     assert "elements of PSHELL 3 and of 1 other properties differ" in mesh.notes[-1]
 
 
@@ -127,6 +130,7 @@ def test_what_is_not_used_is_told(tmp_path):
         ("PCOMP,3,,,,,,,SMEAR\n,1,.1,0.\n", "PCOMP: the lamination 'SMEAR' is not read"),
         ("PSHELL,4,1,.01\n", "PSHELL 3 of CQUAD4 in line 13 is not defined"),
         ("PSHELL,3,1,.01,-1\n", "plane strain"),
+        ("PSHELL,3,7,.01,7\nMAT1,7,2.+11\n", "MAT1: its G is 0 .* give NU"),
         ("PSHELL,3,1,.01\nGRID,9,,2.,0.,0.\nCTRIA3,8,3,2,9,3\n,,.03\n", "TFLAG"),
     ],
 )
