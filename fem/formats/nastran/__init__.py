@@ -144,6 +144,8 @@ def _parameters(deck: Deck) -> float:
             raise card.fail(f"{name} scales a part of the matrices, which is not read")
         if name not in PARAMETERS_WITH_EFFECT:
             deck.leave_out("PARAM", card.place, "it changes no matrix of this model")
+        if name == "WTMASS" and not card.real(1) > 0.0:
+            raise card.fail(f"WTMASS is {card.real(1):g} and must be positive")
     return deck.parameter("WTMASS", 1.0)
 
 

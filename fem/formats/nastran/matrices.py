@@ -77,10 +77,11 @@ def _column(card: Card, matrix: _Matrix) -> None:
     column = card.whole(1), card.whole(2, 0)
     for at in range(4, len(card.fields), 4):
         if card.text(at):
-            row = card.whole(at), card.whole(at + 1, 0)
-            matrix.values[row, column] = card.real(at + 2)
+            row, value = (card.whole(at), card.whole(at + 1, 0)), card.real(at + 2)
+            if matrix.values.setdefault((row, column), value) != value:
+                raise card.fail(f"the number of row {row} and column {column} stands twice")
             if matrix.card.whole(2) == SYMMETRIC:
-                matrix.values[column, row] = card.real(at + 2)
+                matrix.values[column, row] = value
 
 
 def _add(gathered: Gathered, kind: str, name: str, matrix: _Matrix) -> None:

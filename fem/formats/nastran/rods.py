@@ -75,6 +75,9 @@ def _rod(
     area, torsion, added = numbers
     ends = card.whole(first), card.whole(first + 1)
     gathered.add_cell(card, "line", ends, group)
+    places = [gathered.deck.place(grid, card) for grid in ends]
+    if not np.linalg.norm(places[1] - places[0]) > 0.0:
+        raise card.fail("has no length")
     law = materials.isotropic(own.whole(material), own)
     if group not in gathered.described:
         try:

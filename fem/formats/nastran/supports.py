@@ -28,6 +28,8 @@ def chosen_sets(deck: Deck, name: str, sums: str, *cards: str) -> frozenset[int]
     chosen: set[int] = set()
     if value.isdigit():
         chosen = {int(value)}
+        if not chosen <= given | set(adding):
+            deck.notes.append(f"{deck.source}: {name} = {value} chooses a set that is not there")
     elif not deck.control.there and len(given | set(adding)) >= 1:
         tops = set(adding) or given
         if len(tops) == 1:

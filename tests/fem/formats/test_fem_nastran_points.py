@@ -75,6 +75,9 @@ def test_coordinate_systems_stand_in_chains(tmp_path):
          "GRID,9,1,0.,0.,0.\n", "CORD2R: coordinate system 1 rests on itself"),
         ("CORD2R,1,0,0.,0.,0.,0.,0.,1.\n,0.,0.,2.\nGRID,9,1,0.,0.,0.\n", "lie on a line"),
         ("CONM2,9,77,,1.\n", "CONM2: names the grid point 77, which is not defined"),
+        ("PARAM,WTMASS,0.\n", "PARAM: WTMASS is 0 and must be positive"),
+        ("DMIG,A,0,6,1\nDMIG,A,1,1,,1,1,2.\nDMIG,A,1,1,,1,1,3.\n", "DMIG: the number .* twice"),
+        ("GRID,9,,0.,0.,0.\nCONROD,9,1,9,1,1.\n", "CONROD: has no length"),
         ("CELAS1,9,5,1,1\n", "CELAS1: names the property 5, which is not defined"),
         ("CBUSH,9,5,1,2\n", "CBUSH: names the property PBUSH 5, which is not defined"),
         ("PBUSH,5,K,1.\nCBUSH,9,5,1\n", r"CBUSH: has no length, so it needs a .* \(CID\)"),
@@ -103,6 +106,7 @@ def test_case_control_chooses_supports_and_all_else_is_told(tmp_path):
         "SPC1 7 (1, first in line 22): no SPC of case control chooses the set 7"
     ]
     assert not read(tmp_path, cards, "").attachments.supports
+    assert "SPC = 6 chooses a set that is not there" in read(tmp_path, cards, "SPC = 6").notes[0]
     path = tmp_path / "bulk.bdf"
     path.write_text(BRICK + "SPC1,3,123,1,THRU,4\n")
     alone = fem.read_structure(path)
