@@ -167,7 +167,10 @@ def _lines(path: Path, source: Path, folders: Sequence[Path], count: list[int]) 
         other = _other(path, name.strip("'\" ").replace("\\", "/"))
         told = f"{source}: {path.name} line {number}: INCLUDE: the file {other}"
         if not any(other.resolve().is_relative_to(folder) for folder in folders):
-            raise ModelError(f"{told} is in a folder that is not allowed")
+            raise ModelError(
+                f"{told} is in a folder that is not allowed; put it beside the deck or below, or"
+                " give its folder as one of include_folders"
+            )
         if not other.is_file():
             raise ModelError(f"{told} does not exist")
         count[0] += 1
