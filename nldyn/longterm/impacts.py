@@ -61,7 +61,7 @@ class Impacts:
     penetration : (k,)
         Deepest penetration in m.
     peak_force : (k,)
-        Largest force in N.
+        Largest force in N; nan where the stop is rigid, whose impacts have an impulse only.
     impulse : (k,)
         Integral of the force over the contact in N s.
     work : (k,)
@@ -89,14 +89,18 @@ class Impacts:
         return int(self.time.size)
 
     def __repr__(self) -> str:
-        """One line: how many, the largest speed, and the largest force, or impulse where rigid."""
+        """One line: how many, the largest speed and force, and of rigid stops the largest impulse."""
         if not len(self):
             return "<Impacts: none>"
-        largest = self.peak_force.max()
-        hardest = f"{largest:.4g} N" if np.isfinite(largest) else f"{self.impulse.max():.4g} N s"
+        rigid = np.isnan(self.peak_force)
+        most = [f"{self.speed.max():.4g} m/s"]
+        if not rigid.all():
+            most.append(f"{self.peak_force[~rigid].max():.4g} N")
+        if rigid.any():
+            most.append(f"{self.impulse[rigid].max():.4g} N s")
         return (
             f"<Impacts: {len(self)} from {self.time[0]:.4g} to {self.time[-1]:.4g} s, "
-            f"at most {self.speed.max():.4g} m/s and {hardest}>"
+            f"at most {', '.join(most)}>"
         )
 
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -125,7 +129,7 @@ def impacts(motion: Motion | Orbit) -> Impacts:
 
     Times, impulses and losses are as accurate as the flow map; peaks come from the polynomials of
     the contact panels and are good to about 1e-6, the work to about 1e-4. An impact with a rigid
-    stop takes no time; its force is infinite, its impulse is not.
+    stop takes no time and has an impulse, no force.
 
     Parameters
     ----------
@@ -341,7 +345,7 @@ def _of_rigid_stop(motion: Motion, stop: int) -> dict[str, NDArray[Any]]:
         "speed": speed,
         "rebound_speed": rebound,
         "penetration": none,
-        "peak_force": np.full(time.shape, np.inf),
+        "peak_force": np.full(time.shape, np.nan),
         "impulse": mass * (speed + rebound),
         "work": 0.5 * mass * speed**2,
         "loss": 0.5 * mass * (speed**2 - rebound**2),

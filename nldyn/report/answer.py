@@ -6,8 +6,10 @@ from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from nldyn.plot.diagram import branch_curve, length_unit, stability_runs
+from nldyn.plot.diagram import axis_unit, branch_curve, stability_runs
+from nldyn.plot.words import is_angle, units_of
 from nldyn.system.naming import stop_name
+from nldyn.system.rigid_stop import RigidStop
 
 if TYPE_CHECKING:
     from nldyn.branches.branch import Branch
@@ -18,11 +20,19 @@ if TYPE_CHECKING:
 Ranges = list[tuple[float, float]]
 
 FORCES = ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN"))
+Directions = Callable[[str], str]  # of interfaces by their names; empty where none is told
 MOST_RANGES = 5  # told, of many the widest
 NARROW = 1e-6  # share of a range of frequencies that counts as no gap
 
 
-def answer_lines(diagram: Diagram, special_points: Table) -> list[str]:
+def _no_direction(interface: str) -> str:
+    """Where no scene tells it."""
+    return ""
+
+
+def answer_lines(
+    diagram: Diagram, special_points: Table, direction_of: Directions = _no_direction
+) -> list[str]:
     """Peak, largest contact force, where the response is stable, where not, and where it jumps.
 
     Parameters
@@ -31,65 +41,83 @@ def answer_lines(diagram: Diagram, special_points: Table) -> list[str]:
         What was computed.
     special_points : (columns, rows)
         The table of its special points, with their normal forms.
+    direction_of : callable
+        Gives the direction of an interface by its name: rotations are told in rad and N m.
 
     Returns
     -------
     list of str
-        A line for each; empty where there is no branch.
+        A line for each, of the contacts one for each kind: forces, moments, impulses; empty where there is no branch.
     """
     orbits = [orbit for branch in diagram.branches for orbit in branch.points]
     if not orbits:
         return []
     stable = joined(stable_ranges(diagram.branches), diagram.range_hz)
     return [
-        _peak_line(orbits, diagram.observe),
-        _force_line(orbits),
+        _peak_line(orbits, diagram.observe, direction_of(diagram.observe)),
+        *_contact_lines(orbits, direction_of),
         f"stable and periodic: {_listed(stable)}",
         f"nothing stable was found: {_listed(gaps(stable, diagram.range_hz))}",
         f"jumps: {jumps_line(diagram.branches, special_points)}",
     ]
 
 
-def _peak_line(orbits: Sequence[Orbit], observe: str) -> str:
+def _peak_line(orbits: Sequence[Orbit], observe: str, direction: str) -> str:
     def told(orbit: Orbit) -> str:
-        factor, unit = length_unit(orbit.max_abs_displacement)
+        factor, unit = axis_unit(orbit.max_abs_displacement, units_of(direction))
         return f"{orbit.max_abs_displacement / factor:.4g} {unit} at {orbit.frequency_hz:.5g} Hz"
 
-    line = f"largest displacement of '{observe}': "
+    line = f"largest {'rotation' if is_angle(direction) else 'displacement'} of '{observe}': "
     return line + _of_stable_and_all(orbits, lambda orbit: orbit.max_abs_displacement, told)
 
 
-def _force_line(orbits: Sequence[Orbit]) -> str:
-    """The largest force, or where all stops are rigid the largest impulse."""
-    system = orbits[0].system
-    if not system.stops:
-        return "largest contact force: there are no stops"
-    rigid = not system.elastic_stops
-    hits = {id(orbit): _hardest(orbit, rigid) for orbit in orbits}
+def _contact_lines(orbits: Sequence[Orbit], direction_of: Directions) -> list[str]:
+    """The largest force or moment, and of rigid stops the largest impulse, each if there is one."""
+    stops = orbits[0].system.stops
+    if not stops:
+        return ["largest contact force: there are no stops"]
+    kinds: dict[tuple[bool, bool], list[int]] = {}
+    for number, stop in enumerate(stops):
+        kind = isinstance(stop, RigidStop), is_angle(direction_of(stop.at))
+        kinds.setdefault(kind, []).append(number)
+    return [_contact_line(orbits, among, *kind) for kind, among in sorted(kinds.items())]
 
-    def size(orbit: Orbit) -> float:
-        hit = hits[id(orbit)]
-        return 0.0 if hit is None else (hit.impulse if rigid else hit.force) or 0.0
+
+def _contact_line(orbits: Sequence[Orbit], among: Sequence[int], rigid: bool, angle: bool) -> str:
+    """The hardest contact with some stops, all rigid or all elastic."""
+    stops = orbits[0].system.stops
+    hits = {id(orbit): _hardest(orbit, among) for orbit in orbits}
 
     def told(orbit: Orbit) -> str:
-        value, hit = size(orbit), hits[id(orbit)]
-        where = f"at {orbit.frequency_hz:.5g} Hz"
+        hit = hits[id(orbit)]
         if hit is None:
-            return "none, no stop is touched"
-        place = f", at {stop_name(system.stops, hit.stop)}" if len(system.stops) > 1 else ""
-        if rigid:
-            return f"{value:.4g} N s {where}{place}"
-        factor, unit = next((each for each in FORCES if value >= each[0]), FORCES[-1])
-        return f"{value / factor:.4g} {unit} {where}{place}"
+            return f"none, no {'such ' * (len(among) < len(stops))}stop is touched"
+        place = f", at {stop_name(stops, hit.stop)}" if len(stops) > 1 else ""
+        value, moment = _hardness(hit), " m" if angle else ""
+        scale = ((1.0, "N s"),) if rigid else FORCES
+        factor, unit = next((each for each in scale if value >= each[0]), scale[-1])
+        unit = f"N{moment} s" if rigid else unit + moment
+        return f"{value / factor:.4g} {unit} at {orbit.frequency_hz:.5g} Hz{place}"
 
-    name = "largest impulse of an impact: " if rigid else "largest contact force: "
-    return name + _of_stable_and_all(orbits, size, told)
+    name = {
+        (False, False): "largest contact force",
+        (False, True): "largest contact moment",
+        (True, False): "largest impulse of an impact",
+        (True, True): "largest angular impulse of an impact",
+    }[rigid, angle]
+    return f"{name}: " + _of_stable_and_all(orbits, lambda o: _hardness(hits[id(o)]), told)
 
 
-def _hardest(orbit: Orbit, rigid: bool) -> Impact | None:
-    """The impact of an orbit with the largest impulse or force."""
-    hits = [hit for hit in orbit.impact_list if (hit.force is None) == rigid]
-    return max(hits, key=lambda hit: (hit.impulse if rigid else hit.force) or 0.0, default=None)
+def _hardness(hit: Impact | None) -> float:
+    """The force of a contact, of an impact with a rigid stop its impulse; 0 of none."""
+    if hit is None:
+        return 0.0
+    return (hit.impulse if hit.force is None else hit.force) or 0.0
+
+
+def _hardest(orbit: Orbit, among: Sequence[int]) -> Impact | None:
+    """The hardest contact of an orbit with some stops."""
+    return max((hit for hit in orbit.impact_list if hit.stop in among), key=_hardness, default=None)
 
 
 def _of_stable_and_all(

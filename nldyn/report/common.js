@@ -41,7 +41,7 @@ const small = (title, x, y, more) => ({ font: FONT, margin: { l: 65, r: 14, t: 3
 // --- tables --------------------------------------------------------------------------------------
 
 const SHOWN_ROWS = 400;
-const words = (column) => column.replace(/_(hz|m|n_s|n|s|deg|m\/s)$/, (_, unit) => ` (${{ hz: "Hz", n: "N", n_s: "N s" }[unit] ?? unit})`).replaceAll("_", " ");
+const words = (column) => column.replace(/_(hz|m|rad|n_s|n|s|deg|m\/s)$/, (_, unit) => ` (${{ hz: "Hz", n: "N", n_s: "N s" }[unit] ?? unit})`).replaceAll("_", " ");
 function csv(table) {
   const cell = (value) => value === null ? "" : /[",\n]/.test(String(value)) ? `"${String(value).replaceAll('"', '""')}"` : String(value);
   return [table.columns, ...table.rows].map((row) => row.map(cell).join(",")).join("\n") + "\n";

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,7 @@ from nldyn.orbits.harmonics import harmonics
 from nldyn.orbits.orbit import Orbit
 from nldyn.plot.diagram import MARKER_NAMES, beside_stable, orbit_title, stop_places
 from nldyn.plot.orbit import FLOOR, drawn_phases, motion_at
+from nldyn.plot.words import is_angle
 from nldyn.system.naming import stop_name
 
 MOST_POINTS = 120  # that can be looked at, beside the special points
@@ -249,12 +250,13 @@ def shown_phases(orbit: Orbit, count: int, first: float) -> Real:
     return np.unique(np.concatenate([steps, contacts, [first]]) % end)
 
 
-def stops_of(orbit: Orbit) -> dict[str, Any]:
-    """The stops' names, and the displacements at which the observed interface meets some."""
+def stops_of(orbit: Orbit, direction_of: Callable[[str], str]) -> dict[str, Any]:
+    """The stops' names, which act on rotations, and where the observed interface meets some."""
     system = orbit.system
     return {
         "names": [stop_name(system.stops, index) for index in range(len(system.stops))],
         "places": stop_places(system, orbit.observe),
+        "turn": [is_angle(direction_of(stop.at)) for stop in system.stops],
     }
 
 

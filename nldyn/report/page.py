@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
@@ -37,7 +37,7 @@ from nldyn.report.orbit_content import (
     samples_each,
     stops_of,
 )
-from nldyn.scene.build import direction_at
+from nldyn.scene.build import direction_at, directions_of
 from nldyn.search.diagram import Diagram
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from nldyn.scene.schema import Scene
 
 MOST_POINTS = 10_000  # of all branches together that are drawn and listed
+NO_STOPS: dict[str, Any] = {"names": [], "places": [], "turn": []}
 LINE = 62  # letters in a line of what is shown at the pointer
 
 
@@ -130,6 +131,7 @@ def page_content(
     heights = [[node.orbit.max_abs_displacement for node in branch.nodes] for branch in told]
     direction = direction_at(scene, diagram.observe) if scene else ""
     factor, unit = axis_unit(max((max(y) for y in heights), default=1.0), units_of(direction))
+    turns = turning(branches, direction, directions_of(scene))
     chosen = chosen_orbits(branches, heights)
     kept = kept_points(branches)
     notes = [*notes, *dict.fromkeys(diagram.notes), *limits(diagram, chosen, kept)]
@@ -140,7 +142,7 @@ def page_content(
         "answer": summary.get("answer", []),
         "range_hz": list(diagram.range_hz),
         "observed": displacement_of(diagram.observe, direction),
-        "angle": is_angle(direction),
+        "angle": "max_abs_displacement" in turns,
         "natural_hz": branches[0].points[0].system.frequencies_hz.tolist() if branches else [],
         "many": MANY_MARKS,
         "factor": factor,
@@ -150,12 +152,12 @@ def page_content(
         "branches": drawn_branches(told, kept, factor, unit),
         "special": special_marks(told, factor, unit),
         "kinds": MARKER_NAMES,
-        "stops": stops_of(branches[0].points[0]) if branches else {"names": [], "places": []},
+        "stops": stops_of(branches[0].points[0], directions_of(scene)) if branches else NO_STOPS,
         "orbits": orbits,
         "tables": {
             "special points": special_table(tables["special_points"], factor, unit),
-            "branches": branch_table(branches, tables),
-            "points": as_table(kept_rows(tables["points"], branches, kept)),
+            "branches": in_radians(branch_table(branches, tables), turns),
+            "points": in_radians(as_table(kept_rows(tables["points"], branches, kept)), turns),
         },
         "errors": error_table(diagram, tables, summary, orbits),
         "versions": versions(),
@@ -354,13 +356,37 @@ def special_table(table: Table, factor: float, unit: str) -> dict[str, Any]:
     >>> special_table((names, [row]), 1e-6, "µm")["rows"]
     [['A fold.', 'LP', 20.1235, 123.457, '1/1', None, None]]
     """
+    size_name = f"largest {'rotation' if unit.endswith('rad') else 'displacement'} ({unit})"
     rows = []
     for row in records(table):
         hz, size = row["frequency_hz"], row["max_abs_displacement_m"] / factor
         told = [row["meaning"], row["type"], float(f"{hz:.6g}"), float(f"{size:.6g}")]
         rows.append([*told, row["branch"], row.get("period"), row.get("impacts")])
-    columns = ["meaning", "type", "frequency_hz", f"largest displacement ({unit})"]
+    columns = ["meaning", "type", "frequency_hz", size_name]
     return {"columns": [*columns, "branch", "period", "impacts"], "rows": rows}
+
+
+def turning(
+    branches: Sequence[Branch], direction: str, direction_of: Callable[[str], str]
+) -> set[str]:
+    """Columns in rad instead of m: displacements of a rotation, penetrations if all stops turn."""
+    stops = branches[0].points[0].system.stops if branches else ()
+    found = {"max_abs_displacement"} if is_angle(direction) else set()
+    if stops and all(is_angle(direction_of(stop.at)) for stop in stops):
+        found.add("max_penetration")
+    return found
+
+
+def in_radians(table: dict[str, Any], turns: Collection[str]) -> dict[str, Any]:
+    """A table whose columns of some names are in rad.
+
+    Examples
+    --------
+    >>> in_radians({"columns": ["size_m", "gap_m"], "rows": []}, {"gap"})["columns"]
+    ['size_m', 'gap_rad']
+    """
+    names = {f"{name}_m": f"{name}_rad" for name in turns}
+    return {**table, "columns": [names.get(column, column) for column in table["columns"]]}
 
 
 def rounded(values: Iterable[float]) -> list[float]:

@@ -183,13 +183,13 @@ def orbit_to_draw(
 
 
 def deepest_impact(scene: Scene, orbit: Orbit) -> Impact | None:
-    """Give the deepest contact of an orbit, if it touches a stop.
+    """Give the deepest contact of an orbit, or of rigid stops the hardest, if it touches one.
 
     Stops that can be drawn come first: the others are penetrated by angles, not by lengths.
     """
     drawable = [hit for hit in orbit.impact_list if stop_sphere(scene, hit.stop) is not None]
     hits = drawable or orbit.impact_list
-    return max(hits, key=lambda hit: hit.penetration, default=None)
+    return max(hits, key=lambda hit: (hit.penetration, hit.impulse or 0.0), default=None)
 
 
 def deepest_phase(orbit: Orbit, impact: Impact | None) -> float:
@@ -207,7 +207,8 @@ def deepest_state(orbit: Orbit, impact: Impact | None) -> NDArray[np.float64]:
 
 def what_is_drawn(orbit: Orbit, impact: Impact | None) -> str:
     """The title of the picture of an orbit's deepest contact."""
-    what = "largest deflection" if impact is None else "deepest contact"
+    rigid = impact is not None and impact.force is None
+    what = "largest deflection" if impact is None else f"{'hardest' if rigid else 'deepest'} contact"
     return f"{what} of the {orbit_title(orbit, digits=5)}"
 
 
@@ -516,7 +517,7 @@ class Drawing:
         drawing = surface_of(self.component, _mirror(self.scene))
         factor = automatic_scale(drawing, state[None])
         stop = None if impact is None else stop_sphere(self.scene, impact.stop)
-        if impact is None or stop is None:
+        if impact is None or stop is None or impact.penetration == 0.0:
             return factor
         size = extent(drawing.place(np.zeros_like(state))[0])
         radius = stop.radius or drawn_radius(MARK_FRACTION * size)

@@ -24,7 +24,7 @@ from nldyn.report.answer import answer_lines
 from nldyn.report.offline import Table
 from nldyn.report.page import write_page
 from nldyn.runtime.result_directory import result_directory
-from nldyn.scene.build import direction_at
+from nldyn.scene.build import direction_at, directions_of
 from nldyn.search.exploration import Exploration
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def write_results(
         title = scene.title if scene else ""
         direction = direction_at(scene, diagram.observe) if scene else ""
         save_diagram(diagram, folder, title=title, direction=direction, yscale=yscale)
-        told = {**summary(diagram), "answer": answer_lines(diagram, tables["special_points"])}
+        told = {**summary(diagram), "answer": answer_lines(diagram, tables["special_points"], directions_of(scene))}
         text = json.dumps(told, indent=1, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
         if scene is not None:

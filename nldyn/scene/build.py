@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -269,6 +269,11 @@ def direction_at(scene: Scene, interface: str) -> str:
         part = scene.component_scenes[component]
     given = part.matrices.interfaces if part.matrices is not None else part.interfaces
     return getattr(given.get(name), "direction", None) or ""
+
+
+def directions_of(scene: Scene | None) -> Callable[[str], str]:
+    """What gives the direction of an interface by its name; empty where none is told."""
+    return lambda interface: direction_at(scene, interface) if scene is not None else ""
 
 
 def build_candidates(scene: Scene, component: AnyComponent | None = None) -> Candidates:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nldyn import Stop, System, Unbalance, continue_branch, diagram, solve_orbit
+from nldyn import RigidStop, Stop, System, Unbalance, continue_branch, diagram, solve_orbit
 from nldyn.report.answer import answer_lines
 from nldyn.report.results import tables_of
 from nldyn.search.diagram import Diagram
@@ -53,6 +53,36 @@ def test_a_branch_that_folds_jumps_at_its_folds_and_leaves_nothing_beyond_the_fl
     force = lines_of(found)[1]
     depth = max(orbit.max_penetration for orbit in branch.points if orbit.stable)
     assert f"{5e6 * depth:.4g} mN" in force and "(stable" in force
+
+
+def test_rotations_are_told_in_rad_and_their_contacts_in_newton_metres():
+    """The same numbers as of a displacement, in other words and units."""
+    system = oscillator(stops=[Stop.linear("middle", 5e3, gap=2e-5)])
+    branch = continue_branch(solve_orbit(system, 10.0), (10.0, 18.0))
+    found = Diagram((branch,), (10.0, 18.0), "middle")
+    special = tables_of(found)["special_points"]
+    straight = answer_lines(found, special, lambda name: "y")
+    turned = answer_lines(found, special, lambda name: "rotation_z")
+    assert straight == lines_of(found)
+    assert turned[0] == straight[0].replace("displacement", "rotation").replace("µm", "µrad")
+    assert turned[1] == straight[1].replace("force", "moment").replace(" mN ", " mN m ")
+    assert turned[2:] == straight[2:]
+
+
+def test_forces_and_impulses_are_told_apart_where_stops_are_of_both_kinds():
+    """An elastic stop on one side, a rigid one on the other: each with its own largest."""
+    stops = [Stop.linear("middle", 5e3, gap=2e-5), RigidStop("middle", 0.6, gap=4e-5, direction=-1)]
+    system = oscillator(stops=stops)
+    branch = continue_branch(solve_orbit(system, 10.0), (10.0, 12.6))
+    lines = lines_of(Diagram((branch,), (10.0, 12.6), "middle"))
+    assert [line.split(":")[0] for line in lines[1:3]] == [
+        "largest contact force", "largest impulse of an impact"
+    ]  # fmt: skip
+    hits = [hit for orbit in branch.points for hit in orbit.impact_list]
+    rigid = [hit.impulse for hit in hits if hit.force is None]
+    assert lines[1].split(": ")[1].split()[1] in ("N", "mN")
+    told = lines[2].split(": ")[1]
+    assert told.startswith(f"{max(rigid):.4g} N s") if rigid else "no such stop" in told
 
 
 def test_what_no_branch_covers_is_told(one_dof):
