@@ -623,10 +623,11 @@ def simulate(
         from nldyn.report.simulation import write_simulation
         from nldyn.scene.simulation import simulation_of
 
-        with progress_line(quiet):
+        with progress_line(quiet) as line:
             found = simulation_of(
                 loaded, frequency_hz, periods=periods or 100, transient=transient,
                 exponents=exponents, to_hz=to_hz, rate_hz_per_s=rate_hz_per_s or 0.0,
+                progress=line.counted("periods" if to_hz is None else "steps"),
             )  # fmt: skip
         hits = impacts(found.motion)
         write_simulation(found.motion, hits, out, loaded.text, loaded.title)

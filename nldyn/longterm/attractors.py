@@ -39,7 +39,7 @@ from nldyn.orbits.orbit import Orbit, check_observe, same_orbit, stroboscopic
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import orbit_near, random_states, settling_periods
 from nldyn.runtime.executors import check_execution, values_of
-from nldyn.runtime.progress import of_number, shows_progress
+from nldyn.runtime.progress import Progress, of_number, shows_progress, silent
 from nldyn.system.system import System
 
 Kind = Literal["periodic", "quasi-periodic", "chaotic", "drifting", "undecided", "failed"]
@@ -288,6 +288,7 @@ def _exponent_text(found: LyapunovSpectrum) -> str:
     return f"{found.largest:.4g} ± {found.largest_error:.2g} 1/s over {found.periods} periods"
 
 
+@shows_progress()
 def classify_attractor(
     system: System | FlowMap,
     frequency_hz: float,
@@ -295,6 +296,7 @@ def classify_attractor(
     start: Real | None = None,
     observe: str | None = None,
     options: AttractorOptions | None = None,
+    progress: Progress | None = None,
 ) -> Attractor:
     """Find and classify the attractor that a state leads to.
 
@@ -326,6 +328,9 @@ def classify_attractor(
         Interface whose displacement the orbit reports; the first unless given.
     options : AttractorOptions, optional
         Effort.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz, done)``; how much there is to do is not known, and
+        ``done`` is nan.
 
     Returns
     -------
@@ -346,16 +351,22 @@ def classify_attractor(
     'period 2'
     """
     flow = flow_of(system)
-    check_types(options=(options, AttractorOptions, None))
+    check_types(options=(options, AttractorOptions, None), progress=(progress, Callable, None))
     check_frequency("frequency_hz", frequency_hz)
     check_bounded(flow, 2.0 * math.pi * frequency_hz)
     name = check_observe(flow.system, observe)
     state = starting_state(flow, start)
-    return attractor_from(flow, frequency_hz, name, options or AttractorOptions(), state)
+    tell = progress or silent
+    return attractor_from(flow, frequency_hz, name, options or AttractorOptions(), state, tell)
 
 
 def attractor_from(
-    flow: FlowMap, frequency_hz: float, observe: str, options: AttractorOptions, state: Real
+    flow: FlowMap,
+    frequency_hz: float,
+    observe: str,
+    options: AttractorOptions,
+    state: Real,
+    tell: Progress = silent,
 ) -> Attractor:
     """As `classify_attractor`, from a state z."""
     omega = 2.0 * math.pi * frequency_hz
@@ -363,6 +374,7 @@ def attractor_from(
     if transient is None:
         transient = min(settling_periods(flow.system, frequency_hz), SETTLED)
     try:
+        tell(f"transient of {transient} periods", frequency_hz, math.nan)
         state, floor = _settled(flow, state, omega, transient)
     except ConvergenceError as error:
         return Attractor(flow, frequency_hz, "failed", state[None], failure=str(error))
@@ -376,6 +388,7 @@ def attractor_from(
             found = reached_orbit(flow, run, omega, observe, options.max_period, floor)
             if found is not None:
                 return _periodic(flow, frequency_hz, *found, chaos)
+            tell(f"Lyapunov exponents over {periods} periods", frequency_hz, math.nan)
             exponents = spectrum_from(flow, run[-1], omega, periods)
             state = exponents.end
             if exponents.chaotic:

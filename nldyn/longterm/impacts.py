@@ -89,7 +89,7 @@ class Impacts:
         return int(self.time.size)
 
     def __repr__(self) -> str:
-        """One line: how many, the largest speed and force, and of rigid stops the largest impulse."""
+        """How many, the largest speed and force, and of rigid stops the largest impulse."""
         if not len(self):
             return "<Impacts: none>"
         rigid = np.isnan(self.peak_force)

@@ -30,6 +30,7 @@ from nldyn.runtime.executors import check_execution, values_of
 from nldyn.runtime.progress import of_number, shows_progress
 from nldyn.system.system import System
 
+Counted = Callable[[int, int], None]  # told how many of how many are done
 BLOCK = 64  # periods recorded in one call
 PIECE = 2000  # periods of a transient whose states are held at once
 MOST_STEPS = 10**6  # of a sweep, and
@@ -322,7 +323,7 @@ def simulate(
 ) -> list[Motion]: ...
 
 
-@shows_progress(of_number("motions"))
+@shows_progress(of_number("simulated"))
 def simulate(
     system: System | FlowMap,
     frequency_hz: float | Sequence[float] | Real,
@@ -356,7 +357,7 @@ def simulate(
     executor : concurrent.futures.Executor, optional
         Where to compute a list; here unless given.
     progress : callable, optional
-        Called as ``progress(done, total)`` after each motion of a list.
+        Called as ``progress(done, total)``: excitation periods of one motion, or motions of a list.
 
     Returns
     -------
@@ -391,7 +392,7 @@ def simulate(
     if is_list(frequency_hz):
         task = partial(_simulated, flow, periods, transient)
         return values_of(task, cases, executor, progress)
-    return _simulated(flow, periods, transient, cases[0])
+    return _simulated(flow, periods, transient, cases[0], progress or _nobody)
 
 
 def is_list(value: object) -> bool:
@@ -426,15 +427,24 @@ def _starts(flow: FlowMap, start: Real | None, count: int) -> list[Real]:
     return [starting_state(flow, row) for row in modal]
 
 
-def _simulated(flow: FlowMap, periods: int, transient: int, case: tuple[float, Real]) -> Motion:
+def _nobody(done: int, total: int) -> None:
+    """Take what is done for nobody."""
+
+
+def _simulated(
+    flow: FlowMap, periods: int, transient: int, case: tuple[float, Real], tell: Counted = _nobody
+) -> Motion:
     """The motion at a frequency in Hz from a state z at phase zero."""
     frequency_hz, state = case
     omega = 2.0 * math.pi * frequency_hz
-    before, failure = transient_end(flow, state, omega, transient)
+    total = transient + periods
+    before, failure = transient_end(flow, state, omega, transient, lambda done: tell(done, total))
     if before is None:
         raise ConvergenceError(f"the transient at {frequency_hz:g} Hz failed: {failure}")
     stretches = []
-    for trajectory in _blocks(flow, before, omega, transient, periods):
+    block = periods_at_once(flow, BLOCK)
+    for number, trajectory in enumerate(_blocks(flow, before, omega, transient, periods), start=1):
+        tell(min(transient + number * block, total), total)
         failure = trajectory.failure
         if trajectory.record.phase.size:
             stretches.append(trajectory)
@@ -442,7 +452,6 @@ def _simulated(flow: FlowMap, periods: int, transient: int, case: tuple[float, R
             break
     if not stretches:
         raise ConvergenceError(f"the motion at {frequency_hz:g} Hz failed at once: {failure}")
-    block = periods_at_once(flow, BLOCK)
     turns = transient + np.minimum(block * np.arange(len(stretches) + 1.0), periods)
     lost = stretches[-1]
     if lost.failure:
@@ -469,9 +478,13 @@ def starting_state(flow: FlowMap, start: Real | None) -> Real:
 
 
 def transient_end(
-    flow: FlowMap, state: Real, omega: float, periods: int
+    flow: FlowMap,
+    state: Real,
+    omega: float,
+    periods: int,
+    tell: Callable[[int], None] = lambda done: None,
 ) -> tuple[Real | None, str]:
-    """State z after some periods from phase zero on, or None and why there is none."""
+    """State z after some periods from phase zero on, or None and why; tells how many are done."""
     at_once = periods_at_once(flow, PIECE)
     for done in range(0, periods, at_once):
         count = min(periods - done, at_once)
@@ -479,6 +492,7 @@ def transient_end(
         if found.failure:
             return None, found.failure
         state = found.ends[-1]
+        tell(done + count)
     return state, ""
 
 
@@ -527,7 +541,7 @@ def sweep(
 ) -> list[Motion]: ...
 
 
-@shows_progress(of_number("motions"))
+@shows_progress(of_number("simulated"))
 def sweep(
     system: System | FlowMap,
     range_hz: tuple[float, float] | Sequence[tuple[float, float]],
@@ -565,7 +579,7 @@ def sweep(
     executor : concurrent.futures.Executor, optional
         Where to compute a list; here unless given.
     progress : callable, optional
-        Called as ``progress(done, total)`` after each sweep of a list.
+        Called as ``progress(done, total)``: steps of one sweep, or sweeps of a list.
 
     Returns
     -------
@@ -607,11 +621,15 @@ def sweep(
     if several:
         task = partial(_swept, flow, float(rate_hz_per_s), steps_per_period)
         return values_of(task, cases, executor, progress)
-    return _swept(flow, float(rate_hz_per_s), steps_per_period, cases[0])
+    return _swept(flow, float(rate_hz_per_s), steps_per_period, cases[0], progress or _nobody)
 
 
 def _swept(
-    flow: FlowMap, rate: float, steps: int, case: tuple[tuple[float, float], Real]
+    flow: FlowMap,
+    rate: float,
+    steps: int,
+    case: tuple[tuple[float, float], Real],
+    tell: Counted = _nobody,
 ) -> Motion:
     """The sweep over a range in Hz from a state z at phase zero."""
     (first, last), state = case
@@ -633,6 +651,7 @@ def _swept(
         if failure:
             break
         state = end_state(trajectory)
+        tell(k + 1, len(times) - 1)
     if not stretches:
         why = failure or f"{abs(last - first) / rate:g} s are too short to be simulated"
         raise ConvergenceError(f"the sweep from {first:g} Hz failed at once: {why}")

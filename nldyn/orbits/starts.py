@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import FAILURES, ConvergenceError, check_frequency, check_whole
+from nldyn.base.errors import (
+    FAILURES,
+    ConvergenceError,
+    check_frequency,
+    check_types,
+    check_whole,
+)
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.flow.rigid import before_rigid_stops
 from nldyn.orbits.newton import check_bounded, refine, spread
@@ -21,6 +27,7 @@ from nldyn.orbits.shooting import (
     metric_length,
     shooting_problem,
 )
+from nldyn.runtime.progress import Progress, Shares, shows_progress, silent
 from nldyn.system.equilibrium import at_rest, rest
 from nldyn.system.system import System
 
@@ -91,7 +98,9 @@ class Strobe:
     failures: tuple[str, ...]
 
 
-def simulate_strobe(flow: FlowMap, frequency_hz: float, options: OrbitSearchOptions) -> Strobe:
+def simulate_strobe(
+    flow: FlowMap, frequency_hz: float, options: OrbitSearchOptions, tell: Progress = silent
+) -> Strobe:
     """Simulate from rest and from random states and record once per excitation period.
 
     The random states are up to ten times as large as the linear response, the size of resonant
@@ -99,7 +108,7 @@ def simulate_strobe(flow: FlowMap, frequency_hz: float, options: OrbitSearchOpti
     """
     omega = 2.0 * math.pi * frequency_hz
     starts = random_states(flow, omega, options.starts, options.seed)
-    return simulate(flow, omega, starts, options.transient, options.recorded)
+    return simulate(flow, omega, starts, options.transient, options.recorded, tell)
 
 
 def random_states(flow: FlowMap, omega: float, count: int, seed: int | Sequence[int]) -> Real:
@@ -115,11 +124,20 @@ def random_states(flow: FlowMap, omega: float, count: int, seed: int | Sequence[
     return before_rigid_stops(flow, states)
 
 
-def simulate(flow: FlowMap, omega: float, starts: Real, transient: int, recorded: int) -> Strobe:
+def simulate(
+    flow: FlowMap,
+    omega: float,
+    starts: Real,
+    transient: int,
+    recorded: int,
+    tell: Progress = silent,
+) -> Strobe:
     """Simulate from each state (k, 2n) and record the state after each period of the excitation."""
     total = transient + recorded
     runs, failures = [], []
-    for start in starts:
+    hz = omega / (2.0 * math.pi)
+    for number, start in enumerate(starts):
+        tell(f"motion {number + 1} of {len(starts)}", hz, number / len(starts))
         found = flow.strobe(start, omega, total)
         if found.failure:
             failures.append(found.failure)
@@ -163,12 +181,19 @@ def reach(system: System) -> float:
 
 
 def orbits_from_strobe(
-    flow: FlowMap, strobe: Strobe, period: int, observe: str, options: OrbitSearchOptions
+    flow: FlowMap,
+    strobe: Strobe,
+    period: int,
+    observe: str,
+    options: OrbitSearchOptions,
+    tell: Progress = silent,
 ) -> list[Orbit]:
     """Orbits of one minimal period that Newton's method finds from near returns."""
     problem = shooting_problem(flow, period)
     found: list[Orbit] = []
-    for states in strobe.runs:
+    for number, states in enumerate(strobe.runs):
+        hz = strobe.omega / (2.0 * math.pi)
+        tell(f"near returns of motion {number + 1}", hz, number / len(strobe.runs))
         starts = [states[i] for i in near_returns(states, period, options.candidates)]
         orbits = [_refined(problem, start, strobe.omega, observe) for start in starts]
         if not any(orbits):  # an undamped motion goes round an orbit without coming near it
@@ -295,6 +320,7 @@ def _refined(problem: ShootingProblem, start: Real, omega: float, observe: str) 
         return None
 
 
+@shows_progress()
 def find_orbits(
     system: System | FlowMap,
     frequency_hz: float,
@@ -302,6 +328,7 @@ def find_orbits(
     *,
     observe: str | None = None,
     options: OrbitSearchOptions | None = None,
+    progress: Progress | None = None,
 ) -> list[Orbit]:
     """Orbits of period multiple n at one frequency, started from time simulations.
 
@@ -321,6 +348,8 @@ def find_orbits(
         Interface whose displacement is reported.
     options : OrbitSearchOptions, optional
         Effort.
+    progress : callable, optional
+        Called as ``progress(what, frequency_hz, done)``.
 
     Returns
     -------
@@ -347,13 +376,16 @@ def find_orbits(
     flow = flow_of(system)
     check_frequency("frequency_hz", frequency_hz)
     check_bounded(flow, 2.0 * math.pi * frequency_hz)
+    check_types(progress=(progress, Callable, None))
     options = options or OrbitSearchOptions()
-    strobe = simulate_strobe(flow, frequency_hz, options)
+    whole = Shares(progress or silent, {"motions": 1.0, "orbits": 1.0})
+    strobe = simulate_strobe(flow, frequency_hz, options, whole.part("motions"))
     if not strobe.runs:
         raise ConvergenceError(
             f"every simulation at {frequency_hz:g} Hz failed: {strobe.failures[0]}"
         )
-    return orbits_from_strobe(flow, strobe, period, check_observe(flow.system, observe), options)
+    name, tell = check_observe(flow.system, observe), whole.part("orbits")
+    return orbits_from_strobe(flow, strobe, period, name, options, tell)
 
 
 def near_returns(states: Real, period: int, count: int) -> list[int]:

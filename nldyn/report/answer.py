@@ -47,7 +47,8 @@ def answer_lines(
     Returns
     -------
     list of str
-        A line for each, of the contacts one for each kind: forces, moments, impulses; empty where there is no branch.
+        A line for each, of the contacts one for each kind: forces, moments, impulses; empty where
+        there is no branch.
     """
     orbits = [orbit for branch in diagram.branches for orbit in branch.points]
     if not orbits:

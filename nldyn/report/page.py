@@ -37,6 +37,7 @@ from nldyn.report.orbit_content import (
     samples_each,
     stops_of,
 )
+from nldyn.report.stop_spheres import not_drawn
 from nldyn.scene.build import direction_at, directions_of
 from nldyn.search.diagram import Diagram
 
@@ -166,6 +167,7 @@ def page_content(
     }
     if surface is not None:
         content["surface"] = surface
+        content["not_drawn"] = not_drawn(scene) if scene else []
         for shown, each in zip(orbits, chosen, strict=True):
             if "fault" not in shown:
                 shown["motion"] = modal_motion(each.orbit)

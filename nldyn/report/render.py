@@ -16,7 +16,7 @@ from nldyn.report.again import drawn_of
 from nldyn.report.modes import check_modes, mode_table
 from nldyn.report.orbit_content import shown_phases
 from nldyn.report.results import write_table
-from nldyn.report.stop_spheres import stop_sphere, stops_to_draw
+from nldyn.report.stop_spheres import stop_sphere, stops_to_draw, with_stops_not_drawn
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.runtime.result_directory import result_directory
 from nldyn.scene.build import Structure, build_structure, build_system, direction_at
@@ -207,8 +207,10 @@ def deepest_state(orbit: Orbit, impact: Impact | None) -> NDArray[np.float64]:
 
 def what_is_drawn(orbit: Orbit, impact: Impact | None) -> str:
     """The title of the picture of an orbit's deepest contact."""
-    rigid = impact is not None and impact.force is None
-    what = "largest deflection" if impact is None else f"{'hardest' if rigid else 'deepest'} contact"
+    if impact is None:
+        what = "largest deflection"
+    else:
+        what = "hardest impact" if impact.force is None else "deepest contact"
     return f"{what} of the {orbit_title(orbit, digits=5)}"
 
 
@@ -392,7 +394,7 @@ class Drawing:
             self.reduced.basis[:, self.chosen],
             self.mode_titles,
             self.folder / "mode_shapes.html",
-            heading=self.scene.title or "Mode shapes",
+            heading=with_stops_not_drawn(self.scene.title or "Mode shapes", self.scene),
             mirror=_mirror(self.scene),
             stops=stops_to_draw(self.scene),
         )
@@ -415,7 +417,7 @@ class Drawing:
             times=phases / orbit.omega,
             period=orbit.duration,
             first=deepest / orbit.omega,
-            title=what_is_drawn(orbit, impact),
+            title=with_stops_not_drawn(what_is_drawn(orbit, impact), self.scene),
             heading=self.scene.title or "Deepest contact",
             mirror=_mirror(self.scene),
             colour="stress",
@@ -501,7 +503,7 @@ class Drawing:
                 self.component,
                 state,
                 self.folder / f"deepest_{name}.png",
-                title=what_is_drawn(orbit, impact),
+                title=with_stops_not_drawn(what_is_drawn(orbit, impact), self.scene),
                 scale=self.visible_scale(state, impact),
                 stops=stops,
                 mirror=_mirror(self.scene),
@@ -534,7 +536,9 @@ class Drawing:
             self.reduced.expand(history.modal[:-1].T).T,
             self.folder / f"motion.{video}",
             times=history.time[:-1],
-            title=f"one period of the {orbit_title(orbit, digits=5)}",
+            title=with_stops_not_drawn(
+                f"one period of the {orbit_title(orbit, digits=5)}", self.scene
+            ),
             stops=stops_to_draw(self.scene),
             mirror=_mirror(self.scene),
             view=self.view,

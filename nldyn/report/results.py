@@ -138,7 +138,8 @@ def write_results(
         title = scene.title if scene else ""
         direction = direction_at(scene, diagram.observe) if scene else ""
         save_diagram(diagram, folder, title=title, direction=direction, yscale=yscale)
-        told = {**summary(diagram), "answer": answer_lines(diagram, tables["special_points"], directions_of(scene))}
+        answer = answer_lines(diagram, tables["special_points"], directions_of(scene))
+        told = {**summary(diagram), "answer": answer}
         text = json.dumps(told, indent=1, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
         if scene is not None:

@@ -30,3 +30,29 @@ def stops_to_draw(scene: Scene) -> list[StopSphere]:
     """All stops that can be drawn: those on the ground that act along an axis."""
     spheres = (stop_sphere(scene, index) for index in range(len(scene.stops)))
     return [sphere for sphere in spheres if sphere is not None]
+
+
+def not_drawn(scene: Scene) -> list[str]:
+    """Which stops cannot be drawn, each with the reason."""
+    return [
+        f"stop at '{stop.at}' "
+        + (f"against '{stop.against}', between two interfaces" if stop.against else "of a rotation")
+        for index, stop in enumerate(scene.stops)
+        if stop_sphere(scene, index) is None
+    ]
+
+
+def with_stops_not_drawn(title: str, scene: Scene) -> str:
+    """A title that also says how many stops are missing in the picture.
+
+    Examples
+    --------
+    >>> from nldyn.base.resources import example
+    >>> from nldyn.scene.read import load_scene
+    >>> with_stops_not_drawn("deepest contact", load_scene(example("two_dof_xi_0.01.toml")))
+    'deepest contact'
+    """
+    missing = len(not_drawn(scene))
+    if not missing:
+        return title
+    return f"{title}; not drawn: {missing} of {len(scene.stops)} stops"

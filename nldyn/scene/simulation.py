@@ -8,7 +8,7 @@ from nldyn.base.errors import SystemModelError
 from nldyn.flow.flow_map import FlowMap, FlowOptions
 from nldyn.longterm.initial_states import state_with
 from nldyn.longterm.lyapunov import LyapunovSpectrum, lyapunov_exponents
-from nldyn.longterm.simulation import Motion, simulate, sweep
+from nldyn.longterm.simulation import Counted, Motion, simulate, sweep
 from nldyn.scene.build import build_system
 from nldyn.scene.faults import told_as
 from nldyn.scene.schema import Scene
@@ -39,6 +39,7 @@ def simulation_of(
     exponents: bool = False,
     to_hz: float | None = None,
     rate_hz_per_s: float = 0.0,
+    progress: Counted | None = None,
 ) -> Simulation:
     """Simulate a scene from its ``[start]``, at one frequency or through a range.
 
@@ -60,6 +61,8 @@ def simulation_of(
         Frequency in Hz at which a run-up or run-down ends, in place of `periods`.
     rate_hz_per_s : float
         Its rate in Hz/s, positive either way.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with the excitation periods, or the steps of a run-up.
 
     Raises
     ------
@@ -81,11 +84,14 @@ def simulation_of(
         start = None if scene.start is None else state_with(flow.system, **scene.start.model_dump())
     with told_as(scene, (), SystemModelError):
         if to_hz is None:
-            motion = simulate(flow, frequency_hz, periods, start=start, transient=transient)
+            motion = simulate(
+                flow, frequency_hz, periods, start=start, transient=transient, progress=progress
+            )
         else:
             if transient:
                 start = simulate(flow, frequency_hz, transient, start=start).end
-            motion = sweep(flow, (frequency_hz, to_hz), rate_hz_per_s, start=start)
+            ends = frequency_hz, to_hz
+            motion = sweep(flow, ends, rate_hz_per_s, start=start, progress=progress)
         if not exponents:
             return Simulation(motion)
         return Simulation(motion, lyapunov_exponents(flow, frequency_hz, start=motion.end))

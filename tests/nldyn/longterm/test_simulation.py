@@ -18,6 +18,8 @@ from nldyn import (
     System,
     SystemModelError,
     Unbalance,
+    classify_attractor,
+    find_orbits,
     impacts,
     simulate,
     solve_orbit,
@@ -272,3 +274,20 @@ def test_a_long_transient_is_cut_into_short_calls_and_ends_at_the_same_state(mon
     assert (failure, sum(counts)) == ("", periods)
     assert max(counts) == BUNCH
     np.testing.assert_allclose(end, whole.ends[-1], rtol=1e-9)
+
+
+def test_one_long_motion_and_the_searches_tell_how_far_they_are():
+    """Each count goes up to its total; what has no total says what it is at."""
+    one_dof = make_one_dof()
+    counted = []
+    simulate(one_dof, 50.0, 100, transient=150, progress=lambda *n: counted.append(n))
+    assert counted == [(150, 250), (214, 250), (250, 250)]
+    steps = []
+    sweep(one_dof, (20.0, 21.0), 1.0, progress=lambda *n: steps.append(n))
+    assert [done for done, _ in steps] == list(range(1, steps[-1][1] + 1))
+    told = []
+    classify_attractor(one_dof, 50.0, progress=lambda *n: told.append(n))
+    assert told[0][0].startswith("transient of ") and told[0][1] == 50.0
+    shares = []
+    find_orbits(one_dof, 50.0, 2, progress=lambda *n: shares.append(n[2]))
+    assert shares == sorted(shares) and shares[0] == 0.0 and shares[-1] > 0.5
