@@ -39,7 +39,7 @@ found = reduced.static_flexibility("end")  # m/N
 q = reduced.participation["end"] / (2 * np.pi * reduced.frequencies_hz) ** 2
 moved = mesh.points - 30 * bracket.shape(reduced.expand(q))[:, :3]  # 1 N down, 30-fold
 fig, ax = plt.subplots()
-ax.plot(*mesh.points[:, :2].T, ".", color="0.8", ms=2, label="at rest")
+ax.plot(*mesh.points[:, :2].T, ".", color="0.8", ms=2, label="undeformed")
 ax.plot(*moved[:, :2].T, ".", color="tab:blue", ms=2, label="deflected, true scale")
 ax.legend()
 ax.set(aspect="equal", xlabel="x (m)", ylabel="y (m)", title="A push of 30 N at the end")

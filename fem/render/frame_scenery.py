@@ -34,7 +34,7 @@ class StopSphere:
         From the beam to the stop, (x, y) or in a structure (x, y, z): the way the point moves to
         hit it.
     gap
-        In m, from the beam at rest to the stop; negative if they are pressed together.
+        In m, from the undeformed beam to the stop; negative if they are pressed together.
 
     Raises
     ------

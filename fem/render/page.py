@@ -122,7 +122,7 @@ def write_motion(
     period
         In s.
     first
-        The instant in s that is shown at first, at rest until the motion is played.
+        The instant in s that is shown at first, standing until the motion is played.
     title, heading
         Texts above the picture.
     mirror, stops

@@ -55,7 +55,7 @@ PLANE = "#3a78b5"
 AUTO_FRACTION = 0.06
 BAR_ROW = 110
 GHOST_SHRINKAGE = 0.97
-"""Makes the frame at rest a little thinner, so that it hides inside the other where they agree."""
+"""Makes the undeformed frame a little thinner, so that it hides inside the other where they agree."""
 TRIAD = 110  # pixels
 FIELD = (0.20, 0.85, 0.94)
 SHEET_FIELD = (0.05, 0.84, 0.94)
@@ -105,7 +105,7 @@ def render_shape(
 ) -> pyvista.Plotter | float:
     """Picture of a deflected frame or structure, coloured by its displacement or stress.
 
-    Drawn with it: the same at rest in grey, supports, point masses as blocks of steel of that
+    Drawn with it: the same undeformed in grey, supports, point masses as blocks of steel of that
     mass, and the stops at their true places (their gaps scaled as the deflection is). The factor
     on the deflection is stated in the picture.
 
@@ -562,7 +562,7 @@ def length_unit(largest: float) -> tuple[str, float]:
 def scale_note(factor: float, stops: Sequence[StopSphere]) -> str:
     """What the picture says about its scale."""
     red = f";  red: stop{'s' if len(stops) > 1 else ''}" if stops else ""
-    return f"deflection drawn × {factor:g};  grey: at rest{red}"
+    return f"deflection drawn × {factor:g};  grey: undeformed{red}"
 
 
 # What is drawn
@@ -701,7 +701,7 @@ def add_deflected(
     colour: str = "displacement",
     cmap: str = COLOURS,
 ) -> Moving:
-    """Draw the deflected frame and, in grey, the frame at rest."""
+    """Draw the deflected frame and, in grey, the undeformed frame."""
     rest, _ = drawing.place(np.zeros_like(u), shrinkage=GHOST_SHRINKAGE)
     ghost, ghost_edges = polydata(drawing, rest)
     plotter.add_mesh(ghost, color=GHOST, opacity=0.16, lighting=False, show_scalar_bar=False)

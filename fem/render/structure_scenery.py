@@ -145,7 +145,7 @@ def direction_of(stop: StopSphere) -> FloatArray:
 
 
 def reach_along(drawing: StructureSurface, point: FloatArray, towards: FloatArray) -> float:
-    """How far the surface at rest reaches from a point along a unit vector, in m."""
+    """How far the undeformed surface reaches from a point along a unit vector, in m."""
     surface, _ = drawing.place(np.zeros(len(drawing.component.free)))
     arm = surface - point
     along = arm @ towards

@@ -30,7 +30,7 @@ PIECES: dict[str, tuple[tuple[int, ...], ...]] = {
 }
 """How a facet of a kind is cut into flat polygons; 8 is the middle of one with eight nodes."""
 BEHIND = 2e-3
-"""A plane structure at rest is drawn this part of its size behind the deflected one."""
+"""An undeformed plane structure is drawn this part of its size behind the deflected one."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,7 +62,7 @@ def view_of_motion(points: FloatArray, moved: FloatArray) -> FloatArray:
     Parameters
     ----------
     points, moved
-        Points at rest and their displacements, (p, 3) each.
+        Undeformed points and their displacements, (p, 3) each.
 
     Examples
     --------

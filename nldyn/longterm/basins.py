@@ -127,7 +127,8 @@ class StatePlane:
         interface : str, optional
             The first unless given.
         origin : (2n,) array, optional
-            Modal displacements and velocities through which the plane passes; rest unless given.
+            Modal displacements and velocities through which the plane passes; undeformed
+            and still unless given.
 
         Raises
         ------

@@ -461,7 +461,7 @@ def _simulated(
 
 
 def starting_state(flow: FlowMap, start: Real | None) -> Real:
-    """State z (2n,) of a modal one that a user gave; rest for none."""
+    """State z (2n,) of a modal one that a user gave; undeformed and still for none."""
     size = 2 * flow.system.size
     if start is None:
         return np.zeros(size)

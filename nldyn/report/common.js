@@ -10,9 +10,10 @@ const PALETTE = [ORANGE, "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5D4E9C"];
 const FONT = { family: 'system-ui, "DejaVu Sans", sans-serif', size: 12, color: "#202020" };
 const LINE = { showline: true, linecolor: "#888", mirror: true, ticks: "outside", gridcolor: "#eee", zerolinecolor: "#bbb" };
 const axis = (text, more) => ({ ...LINE, title: { text, standoff: 6 }, ...more });
+const NARROW = innerWidth < 700; // of a telephone: no room for the bar of buttons beside a title
 const FLAT = [["toImage", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]];
 const config = (name, buttons = FLAT) => ({ responsive: true, displaylogo: false, scrollZoom: false,
-  modeBarButtons: buttons, toImageButtonOptions: { filename: name, scale: 2 } });
+  modeBarButtons: buttons, displayModeBar: NARROW ? false : "hover", toImageButtonOptions: { filename: name, scale: 2 } });
 function digits(value, count = 6) {
   if (value === null || value === undefined) return "";
   if (Number.isInteger(value) && Math.abs(value) < 1e9) return String(value);
@@ -60,7 +61,7 @@ function sortable(table, name, orbitOf) {
     body.replaceChildren(...rows.slice(0, SHOWN_ROWS).map(([row, i]) => {
       const line = element("tr");
       row.forEach((value, k) => {
-        const text = typeof value === "number" ? digits(value, 8) : value === null ? "" : String(value);
+        const text = typeof value === "number" ? digits(value, NARROW ? 5 : 8) : value === null ? "" : String(value);
         line.append(element("td", text, { class: numeric[k] ? "number" : text.length > 60 ? "long" : "" }));
       });
       if (orbitOf) {

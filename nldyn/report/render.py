@@ -512,7 +512,7 @@ class Drawing:
             )
 
     def visible_scale(self, state: NDArray[np.float64], impact: Impact | None) -> float:
-        """Factor on the deflection at which the stop is not drowned in what it dents."""
+        """Factor on the deflection at which the stop sinks in by half its radius at most."""
         from fem.render.frame_scenery import MARK_FRACTION, drawn_radius
         from fem.render.pictures import automatic_scale, extent, round_number, surface_of
 
@@ -523,7 +523,7 @@ class Drawing:
             return factor
         size = extent(drawing.place(np.zeros_like(state))[0])
         radius = stop.radius or drawn_radius(MARK_FRACTION * size)
-        return min(factor, round_number(2.0 * radius / impact.penetration))
+        return min(factor, round_number(0.5 * radius / impact.penetration))
 
     def motion(self, orbit: Orbit, video: str) -> None:
         """Animate one period of the orbit."""

@@ -119,7 +119,7 @@ def test_pictures_show_all_stops_that_lie_along_an_axis(tmp_path, monkeypatch):
         ]  # fmt: skip
     assert -component.interfaces["middle"] @ u == pytest.approx(depth[2], rel=1e-6)
     size = np.linalg.norm(np.ptp(component.model.mesh.points, axis=0))
-    within_stop = fem.render.pictures.round_number(2.0 * 0.01 * 2.0 * size / depth[2])
+    within_stop = fem.render.pictures.round_number(0.5 * 0.01 * 2.0 * size / depth[2])
     assert options["scale"] == pytest.approx(within_stop)
 
 
