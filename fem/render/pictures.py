@@ -55,7 +55,7 @@ PLANE = "#3a78b5"
 AUTO_FRACTION = 0.06
 BAR_ROW = 110
 GHOST_SHRINKAGE = 0.97
-"""Makes the undeformed frame a little thinner, so that it hides inside the other where they agree."""
+"""Makes the undeformed frame a little thinner, so that the other hides it where they agree."""
 TRIAD = 110  # pixels
 FIELD = (0.20, 0.85, 0.94)
 SHEET_FIELD = (0.05, 0.84, 0.94)

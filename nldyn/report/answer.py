@@ -77,6 +77,8 @@ def _contact_lines(orbits: Sequence[Orbit], direction_of: Directions) -> list[st
     stops = orbits[0].system.stops
     if not stops:
         return ["largest contact force: there are no stops"]
+    if not any(orbit.impacts for orbit in orbits):
+        return ["largest contact force: none, no stop is touched"]
     kinds: dict[tuple[bool, bool], list[int]] = {}
     for number, stop in enumerate(stops):
         kind = isinstance(stop, RigidStop), is_angle(direction_of(stop.at))

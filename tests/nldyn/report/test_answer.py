@@ -85,6 +85,14 @@ def test_forces_and_impulses_are_told_apart_where_stops_are_of_both_kinds():
     assert told.startswith(f"{max(rigid):.4g} N s") if rigid else "no such stop" in told
 
 
+def test_stops_that_no_orbit_touches_are_told_in_one_line():
+    """Also where they are of several kinds."""
+    stops = [Stop.linear("middle", 5e3, gap=1.0), RigidStop("middle", 0.6, gap=1.0, direction=-1)]
+    found = diagram(oscillator(stops=stops), (10.0, 11.0), [1], search_points=1)
+    assert lines_of(found)[1] == "largest contact force: none, no stop is touched"
+    assert len(lines_of(found)) == 5
+
+
 def test_what_no_branch_covers_is_told(one_dof):
     """Beyond its flip the branch is unstable."""
     branch = continue_branch(solve_orbit(one_dof, 30.0), (30.0, 35.0))
