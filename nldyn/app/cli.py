@@ -621,6 +621,7 @@ def simulate(
         check_results(out, loaded, replace)
         from nldyn.longterm.impacts import impacts
         from nldyn.report.simulation import write_simulation
+        from nldyn.scene.build import directions_of
         from nldyn.scene.simulation import simulation_of
 
         with progress_line(quiet) as line:
@@ -630,7 +631,7 @@ def simulate(
                 progress=line.counted("periods" if to_hz is None else "steps"),
             )  # fmt: skip
         hits = impacts(found.motion)
-        write_simulation(found.motion, hits, out, loaded.text, loaded.title)
+        write_simulation(found.motion, hits, out, loaded.text, loaded.title, directions_of(loaded))
     for told in (found.motion, hits, found.spectrum):
         if told is not None:
             click.echo(repr(told).strip("<>"))

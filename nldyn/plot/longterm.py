@@ -26,6 +26,7 @@ from nldyn.plot.diagram import (
     PERIOD_COLOURS,
     STABLE,
     UNSTABLE,
+    axis_unit,
     draw_legend,
     length_unit,
     new_axes,
@@ -33,7 +34,7 @@ from nldyn.plot.diagram import (
     plot_diagram,
     stability_runs,
 )
-from nldyn.plot.words import LENGTHS
+from nldyn.plot.words import LENGTHS, displacement_of, units_of
 from nldyn.search.diagram import Diagram
 
 KIND_COLOURS = {
@@ -257,6 +258,7 @@ def plot_sweep(
     ax: Axes | None = None,
     *,
     interface: str | None = None,
+    direction: str = "",
     diagram: Diagram | Iterable[Branch] | None = None,
 ) -> Axes:
     """Draw the largest displacement of each excitation period of run-ups and run-downs.
@@ -269,6 +271,8 @@ def plot_sweep(
         Where to draw; a new figure unless given, which pyplot shows where it is in use.
     interface : str, optional
         The first unless given.
+    direction : str
+        Its direction: "rotation" and the like are drawn in rad.
     diagram : Diagram or iterable of Branch, optional
         Branches drawn below.
 
@@ -290,7 +294,8 @@ def plot_sweep(
     for k, (hz, _) in enumerate(curves):
         if not hz.size:
             raise SystemModelError(f"motions: entry {k} is shorter than an excitation period")
-    factor, unit = length_unit(max(float(peaks.max(initial=0.0)) for _, peaks in curves))
+    tallest = max(float(peaks.max(initial=0.0)) for _, peaks in curves)
+    factor, unit = axis_unit(tallest, units_of(direction))
     ax = ax if ax is not None else new_axes()
     if diagram is not None:
         branches = diagram if isinstance(diagram, Diagram) else list(diagram)
@@ -305,7 +310,7 @@ def plot_sweep(
         )
     ax.legend(handles=handles, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
     ax.set_xlabel("excitation frequency (Hz)")
-    ax.set_ylabel(f"largest displacement in a period ({unit})")
+    ax.set_ylabel(f"largest {displacement_of(direction=direction)} in a period ({unit})")
     return ax
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,8 +16,9 @@ from nldyn.longterm.impacts import Impacts
 from nldyn.longterm.simulation import Motion
 from nldyn.orbits.history import History
 from nldyn.orbits.orbit import check_observe
-from nldyn.plot.diagram import PERIOD_COLOURS, file_axes, length_unit, save_figure
+from nldyn.plot.diagram import PERIOD_COLOURS, axis_unit, file_axes, save_figure
 from nldyn.plot.longterm import plot_sweep
+from nldyn.plot.words import displacement_of, units_of
 from nldyn.report.results import write_table
 from nldyn.runtime.result_directory import result_directory
 
@@ -27,7 +29,12 @@ AT_ONCE = 8192  # rows that are held at once
 
 
 def write_simulation(
-    motion: Motion, hits: Impacts, directory: str | Path, text: str, title: str = ""
+    motion: Motion,
+    hits: Impacts,
+    directory: str | Path,
+    text: str,
+    title: str = "",
+    direction_of: Callable[[str], str] = lambda interface: "",
 ) -> Path:
     """Write ``motion.csv``, ``impacts.csv``, ``simulation.png`` and ``.svg``, and the scene.
 
@@ -39,6 +46,7 @@ def write_simulation(
         If the directory holds only other people's files or cannot be written.
     """
     observed = check_observe(motion.system, None)
+    direction = direction_of(observed)
     hz, peaks = motion.period_peaks(observed)
     samples = PER_PERIOD * max(hz.size, 1)
     curve = Drawn(observed, math.ceil(samples / BARS) if samples > DRAWN else 1)
@@ -51,7 +59,11 @@ def write_simulation(
         if motion.rate_hz_per_s:
             rows = zip(hz.tolist(), peaks.tolist(), strict=True)
             write_table(folder / "peaks.csv", ("frequency_hz", "max_abs_displacement_m"), rows)
-        ax = plot_sweep(motion) if motion.rate_hz_per_s else plot_motion(curve)
+        ax = (
+            plot_sweep(motion, direction=direction)
+            if motion.rate_hz_per_s
+            else plot_motion(curve, direction)
+        )
         ax.set_title(title or "Simulation")
         save_figure(ax, folder / "simulation")
         (folder / "scene.toml").write_text(text, encoding="utf-8")
@@ -81,12 +93,12 @@ class Drawn:
         return history
 
 
-def plot_motion(curve: Drawn) -> Axes:
-    """Draw the displacement of an interface over the time."""
+def plot_motion(curve: Drawn, direction: str = "") -> Axes:
+    """Draw the displacement of an interface over the time; of a rotation in rad."""
     time, values = np.concatenate(curve.times), np.concatenate(curve.values)
-    factor, unit = length_unit(float(abs(values).max()))
+    factor, unit = axis_unit(float(abs(values).max()), units_of(direction))
     ax = file_axes()
     ax.plot(time, values / factor, color=PERIOD_COLOURS[0], linewidth=0.8)
     ax.set_xlabel("time (s)")
-    ax.set_ylabel(f"displacement of {curve.interface} ({unit})")
+    ax.set_ylabel(f"{displacement_of(curve.interface, direction)} ({unit})")
     return ax

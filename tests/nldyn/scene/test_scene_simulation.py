@@ -7,10 +7,12 @@ import re
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from problems import make_one_dof
 
-from nldyn import ConstantForce, System, simulate
+from nldyn import ConstantForce, System, simulate, sweep
 from nldyn.app.cli import main
-from nldyn.report.simulation import Drawn
+from nldyn.plot.longterm import plot_sweep
+from nldyn.report.simulation import Drawn, plot_motion
 
 SCENE = """
 [matrices]
@@ -186,3 +188,13 @@ def test_a_sweep_that_is_over_at_once_is_told(tmp_path):
     result = told(tmp_path, SCENE, "--frequency-hz", "1.0", *way)
     assert result.exit_code == 1
     assert result.stderr.splitlines()[-1].startswith("nldyn: the sweep from 1 Hz failed at once")
+
+
+def test_a_rotation_is_drawn_in_radians():
+    """A quarter of a milliradian, in place of a quarter of a millimetre."""
+    curve = Drawn("joint", 1, [np.array([0.0, 1.0])], [np.array([0.0, 2.5e-4])])
+    assert plot_motion(curve, "rotation_z").get_ylabel() == "rotation of joint about z (µrad)"
+    assert plot_motion(curve, "y").get_ylabel() == "displacement of joint along y (µm)"
+    motion = sweep(make_one_dof(), (20.0, 21.0), 1.0)
+    labelled = plot_sweep(motion, direction="rotation").get_ylabel()
+    assert labelled.startswith("largest rotation in a period (") and labelled.endswith("rad)")
