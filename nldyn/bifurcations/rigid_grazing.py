@@ -154,6 +154,8 @@ class RootMap:
                 return True
             if row @ effect <= 0.0:
                 return False
+            grown = np.linalg.norm(effect)
+            effect, largest = effect / grown, largest / grown  # else it may grow beyond all numbers
         return True
 
     def with_hits(self, hits: tuple[bool, ...]) -> Beside | None:

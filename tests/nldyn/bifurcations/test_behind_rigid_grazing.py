@@ -29,6 +29,7 @@ from nldyn import (
     solve_orbit,
     switch_branch,
 )
+from nldyn.bifurcations.rigid_grazing import RootMap
 
 TURN = 2.0 * math.pi
 RESTITUTION = 0.8
@@ -165,3 +166,14 @@ def test_what_no_branch_leaves_is_told():
     branch = continue_branch(solve_orbit(soft, 0.25), (0.23, 0.26))
     with pytest.raises(SystemModelError, match="of an elastic stop"):
         switch_branch(next(s for s in branch.special_points if s.kind == "GR"))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("turns_at", "lowers"), [(801, False), (9e9, True)])
+def test_a_growing_motion_may_turn_after_more_periods_than_numbers_reach(turns_at, lowers):
+    """c Aᵏ b = 3ᵏ cos(kθ) is beyond all numbers from k = 647 on, and turns at θ = π / 2k."""
+    angle = 0.5 * math.pi / (turns_at - 0.5)
+    turn = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    one = np.ones(1)
+    root_map = RootMap(None, 3.0 * np.array([turn]), np.eye(2)[:1], np.eye(2)[:1], one, one)
+    assert root_map.lowers is lowers
