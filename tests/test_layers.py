@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # from the roof to the ground; rooms on one floor do not know each other
 FLOORS = {
     "nldyn": "app paper report plot|scene longterm|reduction|io search curves branches bifurcations"
-    " orbits flow runtime|system base",
+    " orbits flow runtime|system engine base",
     "fem": "render assembly checks elements formats model mesh base",
     "cms": "checks reduction solvers|files component base",
 }

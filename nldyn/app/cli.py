@@ -94,7 +94,7 @@ def plain_usage(kind: type[click.UsageError]) -> Iterator[None]:
 
 @contextmanager
 def plain_interrupt() -> Iterator[None]:
-    """Tell Ctrl-C in one line on stderr, and exit; compiled code wraps it."""
+    """Tell Ctrl-C in one line on stderr, and exit; other errors may wrap it."""
     try:
         yield
     except (KeyboardInterrupt, Exception) as error:
@@ -232,22 +232,6 @@ def new(name: str | None, directory: Path | None) -> None:
 
 
 @main.command()
-@quiet_option
-def warm(quiet: bool) -> None:
-    """Compile the kernels beforehand, which else the first run does: a minute or two."""
-    with plain_errors():
-        from nldyn.app.warm import warm as compile_all
-        from nldyn.runtime.progress import progress_line
-
-        with progress_line(quiet):
-            done = compile_all()
-    if done.seconds:
-        click.echo(f"compiled in {done.seconds:.0f} s; kept in {done.folder}")
-    else:
-        click.echo(f"the kernels are compiled already; they are kept in {done.folder}")
-
-
-@main.command()
 @click.argument("directory", type=any_path, metavar="DIR")
 @click.option(
     "--scene",
@@ -288,7 +272,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
     """Check a scene, and print the modes of its structure.
 
     Tells what was read of the mesh, the static flexibility of each interface, and the stops. It
-    compiles nothing and takes a second or two.
+    computes nothing and takes a second or two.
     """
     with plain_errors():
         from nldyn.base.errors import SystemModelError

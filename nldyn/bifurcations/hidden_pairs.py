@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Complex
-from nldyn.bifurcations.hidden_pairs_kernels import (
+from nldyn.bifurcations.hidden_multipliers import (
     dips_towards_circle,
     doubtful,
     error_half_way,

@@ -28,8 +28,7 @@ from nldyn.base.errors import (
     is_finite,
     shown,
 )
-from nldyn.flow.gauss import GaussTables, gauss_tables
-from nldyn.flow.kernels.layout import (
+from nldyn.engine.layout import (
     CONTACT_FAILED,
     DIVERGED,
     NOT_CONVERGED,
@@ -43,13 +42,14 @@ from nldyn.flow.kernels.layout import (
     Record,
     StopRow,
     SystemData,
+    empty_record,
 )
-from nldyn.flow.kernels.newton import Corrector, newton
-from nldyn.flow.kernels.sample import local_extremes, sample_states
+from nldyn.engine.library import Packed
+from nldyn.engine.newton import Corrector, Found, newton, packed_record, packed_system
+from nldyn.engine.sample import local_extremes, sample_states
+from nldyn.flow.gauss import GaussTables, gauss_tables
 from nldyn.flow.options import FlowOptions, _floats, _nodes_for_switch
 from nldyn.flow.packing import bond_row, parameter_tables, stop_row
-from nldyn.runtime.interruption import behind
-from nldyn.runtime.kernel_cache import first_call
 from nldyn.system.contact_law import law_address
 from nldyn.system.linear import ForcedResponse
 from nldyn.system.parameters import Parameter
@@ -228,7 +228,8 @@ class FlowMap:
             return self
         _ = self._unforced  # which both share
         other = copy.copy(self)
-        vars(other).pop("_data", None)
+        for own in ("_data", "_packed"):
+            vars(other).pop(own, None)
         other.clock = Clock(omega, start)
         return other
 
@@ -296,8 +297,18 @@ class FlowMap:
         return self.system.response(omega, self.clock)
 
     @cached_property
+    def _packed(self) -> Packed:
+        """The system as the engine reads it."""
+        return packed_system(self._data)
+
+    @cached_property
+    def _packed_tables(self) -> Packed:
+        """The collocation tables as the engine reads them."""
+        return self.tables.packed()
+
+    @cached_property
     def _data(self) -> SystemData:
-        """What the kernels need to know of the system."""
+        """What the engine needs to know of the system."""
         orders, drive = self.system.forcing(self.clock)
         return self._unforced._replace(orders=orders, drive=drive)
 
@@ -372,10 +383,10 @@ class FlowMap:
             For a parameter that the system does not have, or arrays of the wrong shape or with
             numbers that make no sense.
         """
-        status, *_, ends, jacobians, d_omegas, d_parameters, closings = self._fly(
-            self.no_record, False, nodes, phases, omega, chained, sensitivities, parameters
+        found = self._fly(
+            self._no_room, False, nodes, phases, omega, chained, sensitivities, parameters
         )
-        return Segments(ends, jacobians, d_omegas, d_parameters, closings, self._reason(status))
+        return Segments(*found[5:], self._reason(found.outcome))
 
     def error(
         self,
@@ -479,9 +490,10 @@ class FlowMap:
         capacity = (16 if chained else 64) * np.size(phases)
         while True:
             record = self._record(capacity)
-            status, *_, closings = self._fly(record, True, nodes, phases, omega, chained, False)
-            if status != RECORD_FULL:
-                return self._motion(omega, record, closings, self._reason(status))
+            room = packed_record(record)
+            found = self._fly(room, True, nodes, phases, omega, chained, False)
+            if found.outcome != RECORD_FULL:
+                return self._motion(omega, record, found)
             capacity *= 4
 
     def newton(
@@ -522,20 +534,20 @@ class FlowMap:
             point, record = guess.copy(), self._record(capacity)
             if like is not None:
                 _remember(like.record, record)
-            status, iterations, first, last, along, _, jacobians, *_, closings = self._call(
-                record, True, 0.0, point, phases, False, True, (), corrector
+            found = self._call(
+                packed_record(record), True, 0.0, point, phases, False, True, (), corrector
             )
-            if status != RECORD_FULL:
-                omega = math.exp(point[-1])
-                motion = self._motion(omega, record, closings, self._reason(status))
+            if found.outcome != RECORD_FULL:
+                motion = self._motion(math.exp(point[-1]), record, found)
                 return Solution(
-                    point, along, jacobians, motion, iterations, first, last, self._reason(status)
-                )
+                    point, found.along, found.jacobians, motion, found.iterations, found.first,
+                    found.last, motion.failure,
+                )  # fmt: skip
             capacity *= 4
 
     def _fly(
         self,
-        record: Record,
+        record: Packed,
         recording: bool,
         nodes: Real,
         phases: Real,
@@ -543,8 +555,8 @@ class FlowMap:
         chained: bool,
         sensitivities: bool,
         parameters: Sequence[Parameter] = (),
-    ) -> tuple[Any, ...]:
-        """The flow map alone; see `kernels.newton.newton` for what comes back."""
+    ) -> Found:
+        """The flow map alone."""
         nodes, phases = _floats("nodes", nodes), np.ascontiguousarray(_floats("phases", phases))
         self._check_segments(nodes, phases, omega, chained)
         return self._call(
@@ -554,7 +566,7 @@ class FlowMap:
 
     def _call(
         self,
-        record: Record,
+        record: Packed,
         recording: bool,
         omega: float,
         point: Real,
@@ -563,25 +575,20 @@ class FlowMap:
         sensitivities: bool,
         parameters: Sequence[Parameter],
         corrector: Corrector | None = None,
-    ) -> tuple[Any, ...]:
-        """The kernel, which corrects the point (N + 1,) or, without corrector, only flies."""
+    ) -> Found:
+        """The engine, which corrects the point (N + 1,) or, without corrector, only flies."""
         corrector = corrector or Corrector(point, 0.0, 0.0, 0.0, 0.0, 0, point, -1, 0.0)
         table, drive_by = (
             parameter_tables(self.system, parameters) if parameters else self._no_parameters
         )
-        arguments = (
-            self._data, self.tables, record, recording, omega, point, phases, bool(chained),
-            bool(sensitivities), table, drive_by, corrector,
+        found = newton(
+            self._packed, self._packed_tables, record, recording, omega, point, phases, chained,
+            sensitivities, table, drive_by, corrector, 2 * self.system.size, len(self._pushed),
         )  # fmt: skip
-        try:
-            found = newton(*arguments) if newton.overloads else first_call(newton, *arguments)
-            return (*found[:-1], found[-1][: len(self.system.stops)])
-        except SystemError as error:
-            told = error
-        raise behind(told)  # out here, so that it does not become its own cause
+        return found._replace(closings=found.closings[: len(self.system.stops)])
 
     def _reason(self, status: int) -> str:
-        """Why the kernels gave up; empty if they did not."""
+        """Why the engine gave up; empty if they did not."""
         softens = any(bond.coefficients and not bond.bounded for bond in self.system.bonds)
         if status == CONTACT_FAILED and softens:
             return "the motion runs away along a spring that softens"
@@ -593,17 +600,20 @@ class FlowMap:
         return self._record(0)
 
     @cached_property
+    def _no_room(self) -> Packed:
+        """The same as the engine reads it."""
+        return packed_record(self.no_record)
+
+    @cached_property
     def _no_parameters(self) -> tuple[NDArray[np.int64], Complex]:
         drive = self._unforced.drive
         return np.zeros((0, 2), dtype=np.int64), np.zeros((0, *drive.shape), dtype=complex)
 
-    def _motion(
-        self, omega: float, rec: Record, closings: NDArray[np.int64], failure: str
-    ) -> Trajectory:
+    def _motion(self, omega: float, rec: Record, found: Found) -> Trajectory:
         """The motion in a record, of which only the used part is kept."""
         n = int(rec.used[0])
         pieces = Record._make([*(array[:n].copy() for array in rec[:-1]), rec.used])
-        return Trajectory(self, omega, pieces, closings, failure)
+        return Trajectory(self, omega, pieces, found.closings, self._reason(found.outcome))
 
     @cached_property
     def finer(self) -> FlowMap:
@@ -627,15 +637,8 @@ class FlowMap:
         return values
 
     def _record(self, capacity: int) -> Record:
-        return Record(
-            np.empty(capacity),
-            np.empty(capacity),
-            np.empty(capacity, dtype=np.int64),
-            np.empty(capacity, dtype=np.int64),
-            np.empty((capacity, 2 * self.system.size)),
-            np.empty((capacity, len(self._pushed), self.tables.nodes.size)),
-            np.empty((capacity, len(self._pushed), self.tables.nodes.size)),
-            np.zeros(3, dtype=np.int64),
+        return empty_record(
+            capacity, 2 * self.system.size, len(self._pushed), self.tables.nodes.size
         )
 
 
@@ -733,7 +736,11 @@ class Trajectory:
                 f"phases must lie within the motion, {first:g} to {last:g}, got "
                 f"{phases[0]:g} to {phases[-1]:g}"
             )
-        return self._evaluate(sample_states, phases)
+        flow = self.flow
+        return sample_states(
+            flow._packed, flow._packed_tables, self._packed, self.omega, phases,
+            2 * flow.system.size,
+        )  # fmt: skip
 
     def _solved_in_contact(self, phases: Real) -> tuple[NDArray[np.intp], Real]:
         """Which of some ascending phases lie in contact panels, and the flow map's states (k, 2n).
@@ -755,10 +762,10 @@ class Trajectory:
         start = np.maximum.accumulate(np.where(begins, 0, np.arange(begins.size)))[piece[inside]]
         legs = np.stack([rec.phase[start], phases[inside]], axis=1).ravel()
         nodes = np.repeat(rec.start[start], 2, axis=0)[:-1]
-        status, *_, ends, _, _, _, _ = flow._call(
-            flow.no_record, False, self.omega, _with_zero(nodes), legs, False, False, ()
+        found = flow._call(
+            flow._no_room, False, self.omega, _with_zero(nodes), legs, False, False, ()
         )
-        return (inside, ends[::2]) if status == OK else none
+        return (inside, found.ends[::2]) if found.outcome == OK else none
 
     @cached_property
     def _span(self) -> tuple[float, float]:
@@ -789,8 +796,10 @@ class Trajectory:
         first = flow.first_alike[output]
         if first not in self._extremes:
             ride = flow.ride(first, self.omega)
-            found = self._evaluate(local_extremes, ride.orders, ride.amplitudes, first)
-            self._extremes[first] = found
+            self._extremes[first] = local_extremes(
+                flow._packed, flow._packed_tables, self._packed, self.omega, ride.orders,
+                ride.amplitudes, first,
+            )  # fmt: skip
         return self._extremes[first]
 
     @cached_property
@@ -816,7 +825,7 @@ class Trajectory:
         phases = rec.phase[contact, None] + self.omega * duration * tables.chi[kind]
         return phases.ravel(), (duration * tables.weights[kind]).ravel()
 
-    def _evaluate(self, kernel: Any, *arguments: object) -> Real:
-        """Call a kernel of `sample` on the recorded pieces."""
-        flow = self.flow
-        return np.asarray(kernel(flow._data, flow.tables, self.record, self.omega, *arguments))
+    @cached_property
+    def _packed(self) -> Packed:
+        """The recorded pieces as the engine reads them."""
+        return packed_record(self.record)

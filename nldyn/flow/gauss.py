@@ -9,6 +9,8 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from nldyn.engine.library import Packed
+
 Real = NDArray[np.float64]
 
 # Panel kinds: 2 * (switch at the start) + (switch at the end).
@@ -53,6 +55,14 @@ class GaussTables(NamedTuple):
     fine_grid: Real
     to_fine: Real
     power: int
+
+    def packed(self) -> Packed:
+        """The tables as the engine reads them."""
+        return Packed(
+            self.nodes.size, self.fine_grid.size, self.power, self.chi, self.slope, self.integrate,
+            self.weights, self.to_legendre, self.ends_nodes, self.barycentric, self.fine_grid,
+            self.to_fine,
+        )  # fmt: skip
 
 
 def time_map(kind: int, s: Real | float, power: int = 2) -> tuple[Real | float, Real | float]:

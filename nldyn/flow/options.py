@@ -11,7 +11,7 @@ from scipy.special import gamma, rgamma
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_whole, is_finite, numbers, shown
-from nldyn.flow.kernels.layout import ROUND
+from nldyn.engine.layout import ROUND
 
 FINEST, COARSEST = 1e-13, 1e-2  # relative tolerances that can be met, and that tell orbits apart
 TAIL = 0.3  # of √rtol: the error of a Jacobian goes with the square of a panel's tail

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Complex
 from nldyn.base.errors import check_types
-from nldyn.flow.kernels.layout import FIRST_POWER, StopRow
+from nldyn.engine.layout import FIRST_POWER, StopRow
 from nldyn.flow.options import FlowOptions
 from nldyn.system.contact_law import duration_factor
 from nldyn.system.parameters import OF_SPRINGS, OF_STOPS, Parameter, check_exact

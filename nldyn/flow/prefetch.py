@@ -213,7 +213,7 @@ class Ahead:
         """Values of one function for several arguments; ``each`` is called with how many are done,
         and the last of them.
 
-        The first is computed here: if kernels must be compiled, others find them ready.
+        The first is computed here.
         """
         if not keys:
             return []

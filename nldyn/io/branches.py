@@ -28,8 +28,8 @@ from nldyn.branches.continuation import alike
 from nldyn.branches.endings import StopReason
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.branches.tables import UNITS, orbit_columns
+from nldyn.engine.layout import Record
 from nldyn.flow.flow_map import FlowMap, Trajectory, same_flow
-from nldyn.flow.kernels.layout import Record
 from nldyn.io.flow import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
 from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute
 from nldyn.orbits.bordered import OrbitFamily

@@ -14,7 +14,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_whole, numbers
 from nldyn.flow.flow_map import FlowMap, flow_of
-from nldyn.longterm.lyapunov_kernels import growth_rates
+from nldyn.longterm.growth_rates import growth_rates
 from nldyn.longterm.simulation import (
     MOST_PERIODS,
     cases_at,

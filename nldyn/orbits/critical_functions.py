@@ -1,83 +1,66 @@
-"""Test functions of multipliers, compiled."""
+"""Test functions of multipliers (engine/multipliers.c)."""
 
 from __future__ import annotations
 
-import math
+import ctypes
 
-import numpy as np
+from nldyn.base.arrays import Complex
+from nldyn.engine.library import address_of, function
+from nldyn.engine.numbers import complexes
 
-from nldyn.flow.kernels.compiling import inner, njit
+_WHOLE, _NUMBER, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+_shifted = function("nldyn_shifted_product", _WHOLE, _POINTER, _NUMBER, result=_NUMBER)
+_torus = function("nldyn_torus_test", _WHOLE, _POINTER, result=_NUMBER)
+_nearest = function("nldyn_nearest_pair", _WHOLE, _POINTER, _POINTER)
+_travel = function("nldyn_travel", _WHOLE, _POINTER, _POINTER, result=_NUMBER)
+_outside = function("nldyn_number_outside", _WHOLE, _POINTER, _NUMBER)
 
-NEAR_CIRCLE = 0.4  # distance from the unit circle, within which a multiplier may cross it soon
-LEAST_MODULUS = 1e-3  # that has a logarithm here: far inside
 
-
-@njit(cache=True, error_model="numpy")
-def flip_test(multipliers):
+def flip_test(multipliers: Complex) -> float:
     """∏(μ + 1), each factor divided by 1 + |μ|: changes sign where a multiplier crosses -1."""
-    return shifted_product(multipliers, 1.0)
+    return _shifted_product(multipliers, 1.0)
 
 
-@njit(cache=True, error_model="numpy")
-def branch_point_test(multipliers):
+def branch_point_test(multipliers: Complex) -> float:
     """∏(μ - 1), each factor divided by 1 + |μ|: changes sign where a multiplier crosses +1."""
-    return shifted_product(multipliers, -1.0)
+    return _shifted_product(multipliers, -1.0)
 
 
-@inner
-def shifted_product(multipliers, shift):
-    """∏(μ + shift) / (1 + |μ|)."""
-    product = 1.0 + 0.0j
-    for mu in multipliers:
-        product *= (mu + shift) / (1.0 + abs(mu))
-    return product.real
+def _shifted_product(multipliers: Complex, shift: float) -> float:
+    multipliers = complexes(multipliers)
+    return float(_shifted(multipliers.size, address_of(multipliers), shift))
 
 
-@njit(cache=True, error_model="numpy")
-def torus_test(multipliers):
+def torus_test(multipliers: Complex) -> float:
     """∏(μᵢμⱼ - 1) over pairs i < j, scaled: zero where a pair is on the unit circle.
 
     The product is the determinant of the bialternate product of Φ with itself minus the identity
     (Kuznetsov 2004, section 10.2.2).
     """
-    product = 1.0 + 0.0j
-    for i in range(multipliers.size):
-        for j in range(i):
-            both = multipliers[i] * multipliers[j]
-            product *= (both - 1.0) / (1.0 + abs(both))
-    return product.real
+    multipliers = complexes(multipliers)
+    return float(_torus(multipliers.size, address_of(multipliers)))
 
 
-@njit(cache=True, error_model="numpy")
-def nearest_pair(multipliers):
+def nearest_pair(multipliers: Complex) -> tuple[int, float]:
     """Index of the first of the two whose product is nearest to 1, and how far that is from 1."""
-    index, least = 0, np.inf
-    for i in range(multipliers.size):
-        for j in range(i + 1, multipliers.size):
-            off = abs(multipliers[i] * multipliers[j] - 1.0)
-            if off < least:
-                index, least = i, off
-    return index, least
+    multipliers, off = complexes(multipliers), _NUMBER()
+    return (
+        int(_nearest(multipliers.size, address_of(multipliers), ctypes.addressof(off))),
+        off.value,
+    )
 
 
-@njit(cache=True, error_model="numpy")
-def travel(before, after):
+def travel(before: Complex, after: Complex) -> float:
     """Longest way of a multiplier near the unit circle to the nearest one of the next orbit."""
-    longest = 0.0
-    for mu in before:
-        if abs(math.log(max(abs(mu), LEAST_MODULUS))) < NEAR_CIRCLE:
-            shortest = np.inf
-            for other in after:
-                shortest = min(shortest, abs(other - mu))
-            longest = max(longest, shortest)
-    return longest
+    before, after = complexes(before), complexes(after)
+    return float(_travel(before.size, address_of(before), address_of(after)))
 
 
-@njit(cache=True, error_model="numpy")
-def number_outside(multipliers, tolerance):
+def number_outside(multipliers: Complex, tolerance: float) -> tuple[int, int]:
     """Fewest and most multipliers outside the unit circle, if each modulus may be off so far."""
-    fewest, most = 0, 0
-    for mu in multipliers:
-        fewest += abs(mu) > 1.0 + tolerance
-        most += abs(mu) > 1.0 - tolerance
-    return fewest, most
+    multipliers = complexes(multipliers)
+    place = address_of(multipliers)
+    return (
+        int(_outside(multipliers.size, place, tolerance)),
+        int(_outside(multipliers.size, place, -tolerance)),
+    )

@@ -1,97 +1,75 @@
-"""Compiled: which extremes of two orbits belong together, and which pass zero between them."""
+"""Which extremes of two orbits belong together and pass zero between them (engine/matching.c)."""
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
+from numpy.typing import NDArray
 
-from nldyn.flow.kernels.compiling import njit
+from nldyn.base.arrays import Real
+from nldyn.engine.library import Packed, address_of, function
+from nldyn.engine.numbers import flags, reals
+
+Kinds = NDArray[np.bool_]
+_WHOLE, _NUMBER, _POINTER, _EXTREMES = (
+    ctypes.c_int64, ctypes.c_double, ctypes.c_void_p, ctypes.c_char_p
+)  # fmt: skip
+_nearest = function("nldyn_nearest", _EXTREMES, _WHOLE, _NUMBER, _NUMBER)
+_sign_changes = function("nldyn_sign_changes", _EXTREMES, _EXTREMES, _NUMBER, _POINTER, _POINTER)
+_alone = function("nldyn_alone", _EXTREMES, _EXTREMES, _NUMBER, _POINTER, result=None)
+_dip = function("nldyn_dip", *[_NUMBER] * 5, result=_NUMBER)
+_extreme_dip = function(
+    "nldyn_extreme_dip", _NUMBER, _NUMBER, *[_EXTREMES] * 3, _NUMBER, result=_NUMBER
+)
 
 
-@njit(cache=True, error_model="numpy")
-def nearest(phases, kinds, kind, phase, full):
+def _packed(phases: Real, values: Real, kinds: Kinds) -> Packed:
+    phases = reals(phases)
+    return Packed(phases.size, phases, reals(values), flags(kinds))
+
+
+def nearest(phases: Real, kinds: Kinds, kind: bool, phase: float, full: float) -> int:
     """Index of the extreme of a kind nearest in phase on a circle of length `full`, or -1."""
-    best, shortest = -1, np.inf
-    for i in range(phases.size):
-        if kinds[i] == kind:
-            distance = abs((phases[i] - phase + 0.5 * full) % full - 0.5 * full)
-            if distance < shortest:
-                best, shortest = i, distance
-    return best
+    extremes = _packed(phases, phases, kinds)
+    return int(_nearest(extremes.content, int(kind), phase, full))
 
 
-@njit(cache=True, error_model="numpy")
-def sign_changes(phases_a, values_a, kinds_a, phases_b, values_b, kinds_b, full):
+def sign_changes(
+    phases_a: Real, values_a: Real, kinds_a: Kinds, phases_b: Real, values_b: Real,
+    kinds_b: Kinds, full: float,
+) -> tuple[Kinds, Real]:  # fmt: skip
     """Kinds and phases of the extremes of a and b, nearest to each other, of opposite signs.
 
     The phase is that of the extreme nearer to zero.
     """
+    a, b = _packed(phases_a, values_a, kinds_a), _packed(phases_b, values_b, kinds_b)
     kinds, phases = np.empty(phases_b.size, dtype=np.bool_), np.empty(phases_b.size)
-    n = 0
-    for kind in (True, False):
-        for j in range(phases_b.size):
-            if kinds_b[j] != kind:
-                continue
-            i = nearest(phases_a, kinds_a, kind, phases_b[j], full)
-            if i < 0 or values_a[i] * values_b[j] >= 0.0:
-                continue
-            if nearest(phases_b, kinds_b, kind, phases_a[i], full) == j:
-                kinds[n] = kind
-                phases[n] = phases_b[j] if abs(values_b[j]) < abs(values_a[i]) else phases_a[i]
-                n += 1
+    n = _sign_changes(a.content, b.content, full, address_of(kinds), address_of(phases))
     return kinds[:n], phases[:n]
 
 
-@njit(cache=True, error_model="numpy")
-def alone(phases_a, kinds_a, phases_b, kinds_b, full):
+def alone(phases_a: Real, kinds_a: Kinds, phases_b: Real, kinds_b: Kinds, full: float) -> Kinds:
     """Which extremes of b none of a belongs to: those born or lost between them."""
+    a, b = _packed(phases_a, phases_a, kinds_a), _packed(phases_b, phases_b, kinds_b)
     found = np.empty(phases_b.size, dtype=np.bool_)
-    for j in range(phases_b.size):
-        i = nearest(phases_a, kinds_a, kinds_b[j], phases_b[j], full)
-        found[j] = i < 0 or nearest(phases_b, kinds_b, kinds_b[j], phases_a[i], full) != j
+    _alone(a.content, b.content, full, address_of(found))
     return found
 
 
-@njit(cache=True, error_model="numpy")
-def dip(left, right, before, here, after):
+def dip(left: float, right: float, before: float, here: float, after: float) -> float:
     """Where a function may touch zero unseen between `left` and `right` of here, or nan.
 
     Its three values have one sign, but the parabola through them comes within a quarter of zero.
     """
-    if before * here <= 0.0 or here * after <= 0.0 or left == 0.0 or right == 0.0:
-        return np.nan
-    first, last = (before - here) / left, (after - here) / right
-    curvature = (last - first) / (right - left)
-    slope = first - curvature * left
-    if curvature * here <= 0.0:  # bends away from zero
-        return np.nan
-    where = -0.5 * slope / curvature
-    value = here - 0.25 * slope * slope / curvature
-    least = min(abs(before), abs(here), abs(after))
-    close = left < where < right and value * here < 0.25 * least * abs(here)
-    return where if close else np.nan
+    return float(_dip(left, right, before, here, after))
 
 
-@njit(cache=True, error_model="numpy")
 def extreme_dip(
-    left,
-    right,
-    phases_z,
-    values_z,
-    kinds_z,
-    phases,
-    values,
-    kinds,
-    phases_b,
-    values_b,
-    kinds_b,
-    full,
-):
+    left: float, right: float, phases_z: Real, values_z: Real, kinds_z: Kinds, phases: Real,
+    values: Real, kinds: Kinds, phases_b: Real, values_b: Real, kinds_b: Kinds, full: float,
+) -> float:  # fmt: skip
     """The same for the first of the extremes that does so, each with the nearest ones beside it."""
-    for i in range(phases.size):
-        z = nearest(phases_z, kinds_z, kinds[i], phases[i], full)
-        b = nearest(phases_b, kinds_b, kinds[i], phases[i], full)
-        if z >= 0 and b >= 0:
-            where = dip(left, right, values_z[z], values[i], values_b[b])
-            if where == where:
-                return where
-    return np.nan
+    before, here = _packed(phases_z, values_z, kinds_z), _packed(phases, values, kinds)
+    after = _packed(phases_b, values_b, kinds_b)
+    return float(_extreme_dip(left, right, before.content, here.content, after.content, full))

@@ -14,8 +14,8 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_whole
+from nldyn.engine.newton import Corrector
 from nldyn.flow.flow_map import FlowMap, Solution, Trajectory
-from nldyn.flow.kernels.newton import Corrector
 
 SEGMENTS_PER_PERIOD = 2
 LONGEST_PERIOD = 10**4  # excitation periods of an orbit

@@ -67,8 +67,7 @@ def solve_orbit(
     segments : int, optional
         Number k of shooting segments; where given, the simulation from rest is cut as finely.
     seconds : float
-        Processor time in s, about, that the search without a guess may take; compiling does not
-        count.
+        Processor time in s, about, that the search without a guess may take.
     progress : callable, optional
         Called meanwhile as ``progress(what, frequency_hz, done)``, with the share of that time.
 

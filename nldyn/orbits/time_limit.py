@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 
-from nldyn.runtime.compilation import compilations
 from nldyn.runtime.progress import Progress, silent
 
 
@@ -13,7 +12,7 @@ class OutOfTimeError(RuntimeError):
 
 
 class TimeLimit:
-    """The processor time that a search may take; compiling does not count.
+    """The processor time that a search may take.
 
     Parameters
     ----------
@@ -37,7 +36,7 @@ class TimeLimit:
         self.seconds = seconds
         self.frequency_hz = frequency_hz
         self.tell = progress or silent
-        self._start = time.thread_time() - compilations.seconds()
+        self._start = time.thread_time()
         self._looked = 0.0  # time spent at the last look
 
     def __repr__(self) -> str:
@@ -45,8 +44,8 @@ class TimeLimit:
 
     @property
     def spent(self) -> float:
-        """Processor time in s since the search began, without compiling."""
-        return time.thread_time() - compilations.seconds() - self._start
+        """Processor time in s since the search began."""
+        return time.thread_time() - self._start
 
     def look(self, what: str) -> None:
         """Tell what the search is at.

@@ -39,7 +39,7 @@ def main(out: str | Path, workers: int = 2, *, quiet: bool = False) -> None:
     )
     from nldyn.paper.claims import evaluate, verdict_counts, write_claims
     from nldyn.paper.figures import write_figures
-    from nldyn.paper.jobs import JOBS, compile_all, diagrams_of, tasks_of
+    from nldyn.paper.jobs import JOBS, diagrams_of, tasks_of
     from nldyn.paper.kept import kept_folder
     from nldyn.paper.page import write_page
     from nldyn.paper.workers import worker_processes
@@ -49,7 +49,6 @@ def main(out: str | Path, workers: int = 2, *, quiet: bool = False) -> None:
     check_directory(out)
     folder_kept = kept_folder(out)
     start = time.perf_counter()
-    compile_all(quiet)
     with worker_processes(workers, quiet) as processes:
         with ignored_interruption():  # a terminal sends it to all processes
             tasks = (*tasks_of(JOBS, folder_kept), *tasks_of_chaos(folder_kept))
@@ -90,11 +89,9 @@ def compute_atlas(out: str | Path, workers: int = 2, *, quiet: bool = False) -> 
     >>> compute_atlas("results/atlas")        # doctest: +SKIP
     """
     from nldyn.paper.atlas import atlas_folder, write_atlas
-    from nldyn.paper.jobs import compile_all
     from nldyn.paper.workers import worker_processes
 
     folder = atlas_folder(out)
-    compile_all(quiet)
     with worker_processes(workers, quiet) as processes:
         write_atlas(folder, processes)
     print(f"written to {out}", file=sys.stderr)

@@ -11,19 +11,13 @@ import numpy as np
 import cms
 from nldyn.base.resources import example
 from nldyn.branches.branch import Branch
-from nldyn.branches.continuation import continue_branch
-from nldyn.branches.predictor import predicted
 from nldyn.branches.step_control import ContinuationOptions
-from nldyn.flow.flow_map import Trajectory, flow_of
-from nldyn.longterm.attractors import AttractorOptions, classify_attractor
-from nldyn.orbits.multipliers import floquet_spectrum
+from nldyn.flow.flow_map import flow_of
 from nldyn.orbits.orbit import check_observe
-from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import orbit_near
 from nldyn.paper.kept import kept_diagram
 from nldyn.paper.starts import LOST, Start, is_at, keep_numbers, read_starts
-from nldyn.paper.workers import Task, side_by_side
-from nldyn.runtime.compilation import compilations
+from nldyn.paper.workers import Task
 from nldyn.runtime.progress import Progress, silent
 from nldyn.scene.build import build_system
 from nldyn.scene.component import build_component
@@ -342,31 +336,3 @@ def _joined(parts: Sequence[Diagram]) -> Diagram:
         branches=tuple(branch for part in parts for branch in part.branches),
         notes=tuple(note for part in parts for note in part.notes),
     )
-
-
-def compile_all(quiet: bool) -> None:
-    """Compile the kernels once, for all processes, in two."""
-    side_by_side((compile_kernels, compile_beside), quiet)
-
-
-def compile_kernels(quiet: bool = False) -> None:
-    """Compute a little of all kinds, so that the kernels are compiled."""
-    with compilations.silenced(quiet):
-        system = scene_system("one_dof")
-        diagram(system, (33.0, 34.5), (1, 2), search_points=1)
-        two = scene_system("two_dof_xi_0.01")  # has pairs of multipliers, which one mode has not
-        continue_branch(solve_orbit(two, 30.0), (29.5, 30.5))
-        classify_attractor(system, 36.0, options=AttractorOptions(periods=32))
-
-
-def compile_beside(quiet: bool = False) -> None:
-    """Compile the kernels that come after the flow's, as long as another process compiles those.
-
-    Nothing is told, as the other process does.
-    """
-    with compilations.silenced():
-        flow = flow_of(scene_system("one_dof"))
-        Trajectory(flow, 1.0, flow.no_record, np.zeros(1, dtype=np.int64), "").extremes(0)
-        floquet_spectrum(np.eye(2)[None])
-        point = np.ones(3)
-        predicted(point, point, np.empty((0, 3)), point, 1.0)

@@ -25,7 +25,7 @@ from nldyn.search.diagram import Diagram
 
 ENDING = ".unfinished"
 BESIDE = ("cms", "fem", "meshes", "docs/examples")  # what results depend on, beside the package
-SOURCES = (".py", ".csv", ".toml", ".msh", ".vtu", ".inp")
+SOURCES = (".py", ".c", ".h", ".csv", ".toml", ".msh", ".vtu", ".inp")
 
 
 def unfinished_folder(directory: str | Path) -> Path:
@@ -111,7 +111,7 @@ def _digest(values: Any) -> str:
 def stamp() -> str:
     """Digest of the code, the data and the packages that results depend on."""
     digest = hashlib.sha256(sys.version.encode())
-    for package in ("numpy", "scipy", "numba", "scikit-fem"):
+    for package in ("numpy", "scipy", "scikit-fem"):
         digest.update(version(package).encode())
     for place in (PACKAGE, *(PACKAGE.parent / name for name in BESIDE)):
         for path in sorted(place.rglob("*")):

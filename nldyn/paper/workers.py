@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,7 +13,6 @@ from functools import partial
 from multiprocessing.queues import SimpleQueue
 from typing import TypeVar
 
-from nldyn.runtime.compilation import compilations
 from nldyn.runtime.progress import Progress, Shares, progress_line
 
 Value = TypeVar("Value")
@@ -110,22 +109,10 @@ def worker_processes(count: int, quiet: bool = False) -> Iterator[Workers]:
         yield Workers(pool, messages, report)
 
 
-def side_by_side(functions: Sequence[Callable[[bool], None]], quiet: bool) -> None:
-    """Call functions in processes of their own, whose memory is free afterwards."""
-    context = multiprocessing.get_context("spawn")
-    processes = [context.Process(target=function, args=(quiet,)) for function in functions]
-    with ended_at_failure():
-        for process in processes:
-            process.start()
-        for process in processes:
-            process.join()
-
-
 def _prepare(messages: SimpleQueue[Message]) -> None:
     """Let a worker process tell what it computes, and end when its parent ends."""
     global _messages
     _messages = messages
-    compilations.muted = True  # `side_by_side` has told of them
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

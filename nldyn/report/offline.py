@@ -19,7 +19,7 @@ from fem.render.viewer import viewer_script, viewer_style
 from nldyn.base.version import software_version
 
 HERE = Path(__file__).parent
-PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "plotly")
+PACKAGES = ("numpy", "scipy", "scikit-fem", "plotly")
 
 Table = tuple[Sequence[str], Sequence[Sequence[object]]]
 

@@ -15,7 +15,6 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from nldyn.base.errors import check_types
-from nldyn.runtime.compilation import compilations
 from nldyn.runtime.interruption import ignored_interruption, interrupted
 
 Item = TypeVar("Item")
@@ -245,8 +244,7 @@ def own_processes(jobs: int) -> Iterator[ProcessPoolExecutor | None]:
 
 
 def quiet_process() -> None:
-    """Let this process tell of no compilation, and end when the one that started it ends."""
-    compilations.muted = True
+    """Let this process end when the one that started it ends."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

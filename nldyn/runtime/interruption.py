@@ -1,4 +1,4 @@
-"""Ctrl-C behind other errors: compiled code and imports wrap it, callbacks from C swallow it."""
+"""Ctrl-C behind other errors: imports wrap it, callbacks from C swallow it."""
 
 from __future__ import annotations
 
@@ -33,70 +33,22 @@ def interrupted(error: BaseException | None) -> bool:
     return _swallowed.is_set() or interrupted(error.__cause__ or error.__context__)
 
 
-def behind(error: BaseException) -> BaseException:
-    """What a signal's handler raised while compiled code ran, which then tells of a SystemError.
-
-    Examples
-    --------
-    >>> try:
-    ...     raise SystemError("returned a result with an exception set") from TimeoutError("late")
-    ... except SystemError as error:
-    ...     behind(error)
-    TimeoutError('late')
-    """
-    if interrupted(error):
-        return KeyboardInterrupt()
-    inner = error.__cause__ or error.__context__
-    return behind(inner) if isinstance(error, SystemError) and inner is not None else error
-
-
-@contextmanager
-def deferred_interruption() -> Iterator[None]:
-    """Let Ctrl-C wait until the block is done, in the main thread, which alone it interrupts.
-
-    Examples
-    --------
-    >>> own = signal.signal(signal.SIGINT, signal.default_int_handler)  # may be ignored
-    >>> try:
-    ...     with deferred_interruption():
-    ...         signal.raise_signal(signal.SIGINT)
-    ...         print("to its end")
-    ... except KeyboardInterrupt:
-    ...     print("interrupted")
-    to its end
-    interrupted
-    >>> _ = signal.signal(signal.SIGINT, own)
-    """
-    came: list[int] = []
-    try:
-        with _answered_by(lambda number, frame: came.append(number)):
-            yield
-    finally:
-        if came:
-            signal.raise_signal(signal.SIGINT)
-
-
 @contextmanager
 def ignored_interruption() -> Iterator[None]:
     """Let Ctrl-C have no effect in the block, nor on the processes that are started in it.
+
+    In the main thread, and if Python sets its handler.
 
     Examples
     --------
     >>> with ignored_interruption():
     ...     signal.raise_signal(signal.SIGINT)
     """
-    with _answered_by(signal.SIG_IGN):
-        yield
-
-
-@contextmanager
-def _answered_by(handler: Callable[[int, Any], object] | signal.Handlers) -> Iterator[None]:
-    """Give Ctrl-C to a handler in the block, in the main thread and if Python sets its handler."""
     usual = signal.getsignal(signal.SIGINT)
     if usual is None or threading.current_thread() is not threading.main_thread():
         yield
         return
-    signal.signal(signal.SIGINT, handler)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
     finally:
@@ -106,8 +58,7 @@ def _answered_by(handler: Callable[[int, Any], object] | signal.Handlers) -> Ite
 def heed_swallowed() -> None:
     """Let no Ctrl-C be lost that falls into a callback or destructor, whose errors Python drops.
 
-    The compiler makes many of both. Whatever error follows stands for the Ctrl-C, and where none
-    follows it comes again.
+    Whatever error follows stands for the Ctrl-C, and where none follows it comes again.
     """
     usual = sys.unraisablehook
 

@@ -22,8 +22,6 @@ from typing import Any, ParamSpec, TypeVar
 
 from tqdm import tqdm
 
-from nldyn.runtime.compilation import compilations
-
 Progress = Callable[[str, float, float], None]
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -102,7 +100,7 @@ class ProgressLine:
 
     It tells how much is done, how long the rest will take, and what is being computed. The time
     left is told once a tenth is done, from the pace of the last half of the time, so that it grows
-    where the work stands still; time spent compiling does not count.
+    where the work stands still.
 
     Parameters
     ----------
@@ -122,7 +120,6 @@ class ProgressLine:
     def __init__(self, quiet: bool = False, delay: float = 0.0) -> None:
         self.done = 0.0
         self._start = time.monotonic()
-        self._compiled = compilations.seconds()
         self._course: list[tuple[float, float]] = []  # time spent in s, and the share done by then
         hidden = quiet or not (sys.stderr.isatty() or in_notebook())
         self._bar = None if hidden else _bar(delay)
@@ -141,8 +138,7 @@ class ProgressLine:
             self._bar.update(self.done - self._bar.n)
 
     def _spent(self) -> float:
-        compiling = compilations.seconds() - self._compiled
-        return time.monotonic() - self._start - compiling
+        return time.monotonic() - self._start
 
     def left(self) -> float:
         """Time in s that the rest will take; NaN while that cannot be told."""
@@ -252,7 +248,7 @@ def progress_line(quiet: bool = False) -> Iterator[ProgressLine]:
     report = ProgressLine(quiet)
     _shown += 1
     try:
-        with compilations.silenced(quiet), nullcontext() if quiet else messages_shown():
+        with nullcontext() if quiet else messages_shown():
             yield report
     finally:
         _shown -= 1

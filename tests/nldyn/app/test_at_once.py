@@ -12,7 +12,7 @@ from nldyn.base.resources import example
 SLOW = {
     "numba",
     "llvmlite",
-    "nldyn.flow.kernels.newton",
+    "nldyn.engine.newton",
     "nldyn.flow.flow_map",
     "matplotlib",
     "pyvista",

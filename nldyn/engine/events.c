@@ -1,0 +1,276 @@
+/* When stops open and close. */
+#include "engine.h"
+
+#define PRESSING_ROUNDING 1e-14 /* of its terms: the acceleration against which a rigid stop presses */
+
+/* The output that tells when a stop opens or closes, by passing its gap: the penetration or, of
+ * one that never pulls and is penetrated, what its force goes with. */
+static int watched(const Flow *fl, int s, const bool *closed, const double *w, double phase)
+{
+    if (!never_pulls(fl, s)) return s;
+    const Stop *stop = stop_of(fl, s);
+    if (closed[s]) return (int)stop->release;
+    double depth = output_now(fl, s, w, phase).value - stop->gap;
+    return depth > 10.0 * output_noise(fl, s, w) ? (int)stop->release : s;
+}
+
+/* what that output exceeds the gap by, and its first two rates, the first with all forces; the
+ * second leaves the forces out */
+static Course watched_pace(const Flow *fl, int stop, const bool *closed, const double *w,
+                           double phase)
+{
+    int out = watched(fl, stop, closed, w, phase);
+    Course at = output_now(fl, out, w, phase);
+    if (out != stop) {
+        const double *row = row_of(fl, 0, out);
+        for (int s = 0; s < fl->n_stops; s++) {
+            if (!closed[s]) continue;
+            Course depth = output_now(fl, s, w, phase);
+            double force = law(fl, s, depth.value - stop_of(fl, s)->gap, depth.first).force;
+            const double *push = push_of(fl, s);
+            for (int k = 0; k < fl->size; k++) at.first -= row[k] * push[k] * force;
+        }
+        at.second = 0.0;
+    }
+    at.value -= stop_of(fl, stop)->gap;
+    return at;
+}
+
+/* time (of either sign) to the instant at which a stop opens or closes in flight, or inf: the
+ * nearer root of the parabola through the present; inf where the gap changes the wrong way */
+static double time_to_event(const Flow *fl, int stop, const bool *closed, const double *w,
+                            double phase)
+{
+    Course at = watched_pace(fl, stop, closed, w, phase);
+    double speed = at.first;
+    if (closed[stop] ? speed >= 0.0 : speed <= 0.0) return INFINITY;
+    double square = speed * speed - 2.0 * at.second * at.value;
+    double root = square > 0.0 ? sqrt(square) : fabs(speed);
+    return -2.0 * at.value / (speed + copysign(root, speed));
+}
+
+/* rounding error of the acceleration that a rigid stop takes from what rests on it */
+static double pressing_noise(const Flow *fl, int stop, const double *w)
+{
+    return PRESSING_ROUNDING * output_size(fl, stop, w, 2);
+}
+
+/* time from the end of a panel to where a rigid stop's force changes its sign, or inf; the panel
+ * must not be stretched at its end */
+static double time_to_release(const Gauss *tab, int stop, int kind, double h, const Panel *panel)
+{
+    for (int a = 0; a < panel->na; a++) {
+        if (panel->active[a] != stop) continue;
+        const double *output = panel->output + (size_t)a * panel->m;
+        double slope = slope_at_end(tab, output) / (h * (kind == 0 ? 1.0 : 2.0));
+        if (slope < 0.0) return -at_end(tab, output) / slope;
+    }
+    return INFINITY;
+}
+
+/* largest error allowed in the instant of an event, as a share of a panel */
+static double coarsest_instant(const Flow *fl)
+{
+    double found = 0.0;
+    for (int s = 0; s < fl->n_stops; s++) found = larger(found, stop_of(fl, s)->instant);
+    return found;
+}
+
+/* whether a stop is just about to switch, to within a time allowed or rounding */
+static bool at_switch(const Flow *fl, int stop, const double *w, double phase, double allowed,
+                      const bool *closed)
+{
+    Course at = watched_pace(fl, stop, closed, w, phase);
+    int out = watched(fl, stop, closed, w, phase);
+    return fabs(at.value) <= allowed * fabs(at.first) + 10.0 * output_noise(fl, out, w);
+}
+
+/* whether a stop is to open or close now, to within a time allowed or rounding; a rigid one does
+ * so by itself, see `impact` */
+static bool with_event(const Flow *fl, int stop, const double *w, double phase, double allowed,
+                       const bool *closed)
+{
+    if (is_bond(fl, stop) || is_rigid(fl, stop)) return false;
+    if (!at_switch(fl, stop, w, phase, allowed, closed)) return false;
+    return closed[stop] != (watched_pace(fl, stop, closed, w, phase).first > 0.0);
+}
+
+/* whether a body rests on a stop that is rigid */
+static bool resting(const Flow *fl, int stop, const bool *closed)
+{
+    return closed[stop] && is_rigid(fl, stop);
+}
+
+/* error allowed in the instant at which a stop and others with it open or close */
+static double instant_with(const Flow *fl, int aim, const double *w, double phase, double h,
+                           const bool *closed)
+{
+    double allowed = stop_of(fl, aim)->instant * h;
+    for (int s = 0; s < fl->n_stops; s++) {
+        double share = stop_of(fl, s)->instant * h;
+        if (share < allowed &&
+            with_event(fl, s, w, phase, 10.0 * coarsest_instant(fl) * h, closed))
+            allowed = share;
+    }
+    return allowed;
+}
+
+/* stop that is to open or close now, to within a share of a length h of time, or -1 */
+static int stop_at_switch(const Flow *fl, const double *w, double phase, double h,
+                          const bool *closed)
+{
+    int stop = -1;
+    double nearest = INFINITY, allowed = 10.0 * coarsest_instant(fl) * h;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (is_bond(fl, s) || (is_rigid(fl, s) && closed[s])) continue;
+        double late = fabs(time_to_event(fl, s, closed, w, phase));
+        double gap = watched_pace(fl, s, closed, w, phase).value;
+        int out = watched(fl, s, closed, w, phase);
+        bool here = late <= allowed || fabs(gap) <= 10.0 * output_noise(fl, out, w);
+        if (late < nearest && here) {
+            stop = s;
+            nearest = late;
+        }
+    }
+    return stop;
+}
+
+/* Longest panel on which the slopes of stops that closed a little before (sign 1) are smooth; with
+ * sign -1 the same at the end of a panel, of stops that open a little after it, `event` left out.
+ *
+ * A law with a power that is not whole is singular at its switch; at a distance τ from it, 4 τ is
+ * a length on which Legendre coefficients fall by 2.6 from one to the next (Bernstein's ellipse).
+ * Where a map has its nodes crowded there (switched), a switch within the error allowed in its
+ * instant does not count. */
+static double graded_length(const Flow *fl, const Panel *panel, const double *w, double phase,
+                            double h, double sign, bool switched, int event)
+{
+    double longest = INFINITY;
+    for (int a = 0; a < panel->na; a++) {
+        int s = panel->active[a];
+        if (s == event || !singular_slope(fl, s)) continue;
+        Course at = output_now(fl, s, w, phase);
+        double delta = at.value - stop_of(fl, s)->gap, speed = at.first, accel = at.second, away;
+        if (delta <= 10.0 * output_noise(fl, s, w)) continue;
+        if (accel > 0.0 && speed * speed < 2.0 * accel * delta)
+            away = sqrt(2.0 * delta / accel); /* it nearly opens: a complex pair */
+        else if (sign * speed > 0.0)
+            away = delta / fabs(speed);
+        else
+            continue;
+        if (!switched || away > 10.0 * stop_of(fl, s)->instant * h)
+            longest = smaller(longest, 4.0 * away);
+    }
+    return longest;
+}
+
+/* a stop that opens or closes within a panel, or -1; the fraction of the panel; and the fraction
+ * at which one first comes so near to it that only the state can tell; fractions are 2 for none */
+typedef struct {
+    int stop;
+    double where, doubtful;
+} Event;
+
+/* what a stop shows of itself in a panel: values at 0, the nodes and 1, positive as long as
+ * nothing happens, their Legendre tail, their rounding error and the first rate */
+typedef struct {
+    double noise, tail, speed;
+} Shown;
+
+/* fill s->inner (m,) with the output that tells of a closed stop */
+static void show_closed(const Flow *fl, const Panel *panel, int position, int s, int out,
+                        double *inner)
+{
+    int m = panel->m;
+    for (int i = 0; i < m; i++) inner[i] = panel->output[position * m + i];
+    if (out == s) return;
+    double creep_time = stop_of(fl, s)->dashpot / stop_of(fl, s)->stiffness;
+    for (int i = 0; i < m; i++)
+        inner[i] += creep_time * panel->output[(panel->na + position) * m + i];
+}
+
+/* fill s->values (m + 2,) of a stop; `position` is its place among the closed ones */
+static Shown show_stop(const Motion *M, int kind, double phase, double h, int stop, int out,
+                       int position)
+{
+    const Flow *fl = M->fl;
+    const Gauss *tab = M->tab;
+    Scratch *s = M->s;
+    const Panel *panel = M->panel;
+    int m = panel->m;
+    double gap = stop_of(fl, stop)->gap, sign = M->closed[stop] ? 1.0 : -1.0;
+    Course first = output_now(fl, out, M->w, phase);
+    double start = first.value, end = output_now(fl, out, M->w_end, phase + fl->omega * h).value;
+    Shown shown = {output_noise(fl, out, M->w), 0.0, sign * first.first};
+    if (M->closed[stop]) {
+        show_closed(fl, panel, position, stop, out, s->inner);
+        if (is_rigid(fl, stop)) {
+            const double *output = panel->output + (size_t)position * m;
+            shown.noise = pressing_noise(fl, stop, M->w);
+            shown.speed = 0.0;
+            start = at_start(tab, output) + gap;
+            end = at_end(tab, output) + gap;
+        }
+    } else {
+        node_outputs(fl, tab, kind, phase, M->w, h, panel, out, s->inner, s);
+        for (int i = 0; i < m; i++) s->inner[i] = gap - s->inner[i];
+    }
+    s->values[0] = sign * (start - gap);
+    s->values[m + 1] = sign * (end - gap);
+    for (int i = 0; i < m; i++) s->values[i + 1] = s->inner[i];
+    refine(tab, s->values, s->fine);
+    shown.tail = 4.0 * legendre_tail(tab, s->inner);
+    return shown;
+}
+
+/* whether a stop that lets go without pulling is beyond its surface at stretched time `root`, where
+ * its force would press in vain */
+static bool presses_in_vain(const Motion *M, int kind, double phase, double h, int stop,
+                            double root)
+{
+    Scratch *s = M->s;
+    const Flow *fl = M->fl;
+    int m = M->panel->m;
+    node_outputs(fl, M->tab, kind, phase, M->w, h, M->panel, stop, s->inner, s);
+    for (int i = 0; i < m; i++) s->values[i + 1] = s->inner[i];
+    s->values[0] = output_now(fl, stop, M->w, phase).value;
+    s->values[m + 1] = output_now(fl, stop, M->w_end, phase + fl->omega * h).value;
+    return interpolate(M->tab, s->values, root) < stop_of(fl, stop)->gap;
+}
+
+/* the first event within a panel */
+static Event first_event(const Motion *M, int kind, double phase, double h)
+{
+    const Flow *fl = M->fl;
+    Scratch *s = M->s;
+    Event found = {-1, 2.0, 2.0};
+    int position = -1;
+    for (int stop = 0; stop < fl->n_stops; stop++) {
+        if (M->closed[stop]) position++; /* a bond is always closed */
+        if (is_bond(fl, stop)) continue;
+        int out = watched(fl, stop, M->closed, M->w, phase);
+        Shown shown = show_stop(M, kind, phase, h, stop, out, position);
+        double below = shown.noise + shown.tail, edge = 0.0;
+        if (shown.speed > 0.0) { /* the panel may begin a little before the event it begins with */
+            below += 2.0 * larger(-s->values[0], 0.0);
+            edge = smaller(2.0 * s->values[0], 0.0);
+        }
+        double root = first_root(M->tab, s->values, s->fine, below, edge);
+        if (root <= 1.0) {
+            double fraction = map_fraction(M->tab, kind, root);
+            if (!M->closed[stop] && out != stop &&
+                presses_in_vain(M, kind, phase, h, stop, root)) {
+                found.doubtful = smaller(found.doubtful, fraction);
+            } else if (fraction < found.where) {
+                found.stop = stop;
+                found.where = fraction;
+            }
+        } else if (shown.tail > 10.0 * shown.noise) {
+            double low = first_doubt(M->tab, s->values, s->fine, shown.noise, shown.tail);
+            if (low < 1.0)
+                found.doubtful = smaller(found.doubtful, map_fraction(M->tab, kind, low));
+        }
+    }
+    if (!(found.doubtful < found.where)) found.doubtful = 2.0;
+    return found;
+}

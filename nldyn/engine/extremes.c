@@ -1,0 +1,319 @@
+/* Local extremes of an output of a recorded motion. */
+#include "engine.h"
+
+#define UNSEEN 1e-14 /* share of a displacement that rounding may be */
+#define PER_HALF_WAVE 8.0 /* samples of the fastest motion that is seen, between which is sought */
+#define SOON 1e-6 /* of the time to the next sample: a difference over it is the slope of a rate */
+#define MOST_SAMPLES 3000000 /* of a piece, in which no more extremes are told */
+#define KEPT_WEIGHTS 1024 /* samples of a panel whose weights are kept for the next panel */
+
+/* a search for extremes; the output is row . w + Re Σ forced e(t), of all terms of the response and
+ * of a base on which it rides */
+typedef struct {
+    Flow fl;
+    Piece piece;
+    Watch watch;
+    const double *row, *row1; /* (2n,) of the output and its rate */
+    int n_terms;
+    Term *terms;
+    Complex *forced; /* (1 + n_terms,) */
+    double *w, *v, *weights, *fresh;
+    Square *steps; /* (n,) exponentials over a sample of a flight */
+    int64_t n_samples, kept; /* of the piece at hand; with which `weights` were made */
+    int sign, first_sign;
+    double first_value;
+    double t_old, rate_old, t_older, rate_older;
+    double *found; /* (capacity, 3) */
+    int64_t capacity, count;
+} Search;
+
+/* value and rate (slope) of the output, with the homogeneous state w, a time t after the start of
+ * the piece */
+static Value output_rate(const Search *S, double t, const double *w)
+{
+    double omega = S->fl.omega, phase = S->piece.phase + omega * t;
+    Complex turn = product(S->forced[0], turned(phase));
+    Value found = {turn.re, -omega * turn.im};
+    for (int k = 0; k < S->n_terms; k++) {
+        TermCourse e = term_since(S->terms + k, omega, phase, t);
+        found.value += product(S->forced[1 + k], e.value).re;
+        found.slope += product(S->forced[1 + k], e.first).re;
+    }
+    for (int k = 0; k < S->fl.size; k++) {
+        found.value += S->row[k] * w[k];
+        found.slope += S->row1[k] * w[k];
+    }
+    return found;
+}
+
+/* the same with the state solved for */
+static Value output_rate_at(Search *S, double t)
+{
+    state_at(&S->piece, t, S->v);
+    return output_rate(S, t, S->v);
+}
+
+static void append_extreme(Search *S, double phase, double value, int sign)
+{
+    if (S->count < S->capacity) {
+        double *row = S->found + 3 * S->count;
+        row[0] = phase;
+        row[1] = value;
+        row[2] = sign;
+    }
+    S->count++;
+}
+
+/* weight of the value at the far end when the near end moves once more on the same side */
+static double shrink(double new, double old)
+{
+    double weight = old != 0.0 ? 1.0 - new / old : 0.5;
+    return weight > 0.0 ? weight : 0.5;
+}
+
+/* append the extreme where the rate changes its sign between two times of a piece, by the secant
+ * that weighs down an end kept twice [Anderson and Björck 1973] */
+static void append_turning_point(Search *S, int sign, double lo, double hi, double rate_lo,
+                                 double rate_hi)
+{
+    double middle = hi, value = 0.0, spacing = S->piece.h / (double)S->n_samples;
+    for (int step = 0; step < 100; step++) {
+        double last = middle;
+        middle = lo - rate_lo * (hi - lo) / (rate_hi - rate_lo);
+        if (step > 10 && step % 2 == 0) middle = 0.5 * (lo + hi);
+        Value at = output_rate_at(S, middle);
+        value = at.value;
+        if (at.slope * sign > 0.0) {
+            if (step > 0 && last < middle) rate_hi *= shrink(at.slope, rate_lo);
+            lo = middle;
+            rate_lo = at.slope;
+        } else {
+            if (step > 0 && last > middle) rate_lo *= shrink(at.slope, rate_hi);
+            hi = middle;
+            rate_hi = at.slope;
+        }
+        if (fabs(middle - last) <= SLACK * spacing || at.slope == 0.0) break;
+    }
+    append_extreme(S, S->piece.phase + S->fl.omega * middle, value, sign);
+}
+
+/* where the parabola through three rates of one sign comes within a quarter of zero, or nan */
+static double near_zero(double a, double b, double c, double rate_a, double rate_b, double rate_c)
+{
+    double first = (rate_b - rate_a) / (b - a), last = (rate_c - rate_b) / (c - b);
+    double curvature = (last - first) / (c - a);
+    if (curvature * rate_b <= 0.0) return NAN;
+    double slope = first + curvature * (b - a), where = b - 0.5 * slope / curvature;
+    double value = rate_b - 0.25 * slope * slope / curvature;
+    double least = smaller(smaller(fabs(rate_a), fabs(rate_b)), fabs(rate_c));
+    return value * rate_b < 0.25 * least * fabs(rate_b) ? where : NAN;
+}
+
+/* Look for two extremes between samples of one sign, where their parabola comes to zero; behind an
+ * impact, where the rate may turn fast, by its slope. */
+static void look_between(Search *S, int64_t i, double t, double rate)
+{
+    double lo = S->t_older, hi = t, rate_lo = S->rate_older, rate_hi = rate;
+    double middle = S->t_old, rate_middle = S->rate_old, slope = 0.0;
+    if (i == 1) {
+        lo = S->t_old;
+        rate_lo = S->rate_old;
+        slope = (output_rate_at(S, SOON * t).slope - S->rate_old) / (SOON * t);
+    }
+    for (int step = 0; step < 3; step++) {
+        double where;
+        if (i == 1 && step == 0)
+            where = slope * S->rate_old < 0.0 ? -2.0 * S->rate_old / slope : hi;
+        else
+            where = near_zero(lo, middle, hi, rate_lo, rate_middle, rate_hi);
+        if (!(lo < where && where < hi) || where == middle) return;
+        double rate_where = output_rate_at(S, where).slope;
+        if (where < middle) {
+            hi = middle;
+            rate_hi = rate_middle;
+        } else {
+            lo = middle;
+            rate_lo = rate_middle;
+        }
+        if (rate_where * S->sign < 0.0) {
+            append_turning_point(S, S->sign, lo, where, rate_lo, rate_where);
+            append_turning_point(S, -S->sign, where, hi, rate_where, rate_hi);
+            S->rate_old = 0.0; /* the next three samples would show the same pair */
+            return;
+        }
+        middle = where;
+        rate_middle = rate_where;
+    }
+}
+
+/* set to zero what the output shows by rounding alone, vibrations that ended long ago, of modes that
+ * may be very fast; the fastest vibration left, in rad/s */
+static double leave_unseen(Search *S)
+{
+    const Flow *fl = &S->fl;
+    double least = 0.0, fastest = 0.0, *w = S->piece.start, *sizes = S->v;
+    for (int p = 0; p <= S->n_terms; p++) least += modulus(S->forced[p]);
+    for (int b = 0; b < fl->n; b++) {
+        int j = 2 * b;
+        sizes[b] = hypot(S->row[j], S->row[j + 1]) * hypot(w[j], w[j + 1]);
+        least += sizes[b];
+    }
+    least *= UNSEEN;
+    for (int b = 0; b < fl->n; b++) {
+        if (sizes[b] <= least) {
+            w[2 * b] = w[2 * b + 1] = 0.0;
+            continue;
+        }
+        const double *block = block_of(fl, b);
+        double half = 0.5 * (block[0] - block[3]), square = half * half + block[1] * block[2];
+        fastest = larger(fastest, sqrt(larger(-square, 0.0)));
+    }
+    return fastest;
+}
+
+/* homogeneous state at sample i of a flight */
+static void next_in_flight(Search *S, int64_t i)
+{
+    double *w = S->w;
+    for (int b = 0; b < S->fl.n; b++) {
+        double x = w[2 * b], y = w[2 * b + 1];
+        w[2 * b] = i == 0 ? S->piece.start[2 * b] : S->steps[b].a * x + S->steps[b].b * y;
+        w[2 * b + 1] =
+            i == 0 ? S->piece.start[2 * b + 1] : S->steps[b].c * x + S->steps[b].d * y;
+    }
+}
+
+/* fill the weights of the nodes up to the samples of a panel, unless those at hand fit */
+static void make_weights(Search *S)
+{
+    if (S->kept == S->n_samples || S->n_samples >= KEPT_WEIGHTS) return;
+    for (int64_t i = 0; i <= S->n_samples; i++)
+        antiderivative_weights(S->piece.tab, (double)i / S->n_samples,
+                               S->weights + (size_t)i * S->piece.tab->m);
+    S->kept = S->n_samples;
+}
+
+static const double *weights_at(Search *S, int64_t i)
+{
+    if (S->n_samples < KEPT_WEIGHTS) return S->weights + (size_t)i * S->piece.tab->m;
+    antiderivative_weights(S->piece.tab, (double)i / S->n_samples, S->fresh);
+    return S->fresh;
+}
+
+/* look at the sample i of a piece, at time t, and between it and those before */
+static void look_at(Search *S, int64_t n, int64_t i, double t)
+{
+    Value at = output_rate(S, t, S->w);
+    int sign = at.slope > 0.0 ? 1 : at.slope < 0.0 ? -1 : S->sign;
+    if (n == 0 && i == 0) S->first_value = at.value;
+    if (S->first_sign == 0) S->first_sign = S->sign = sign;
+    if (sign != S->sign) {
+        if (i > 0)
+            append_turning_point(S, S->sign, S->t_old, t, S->rate_old, at.slope);
+        else
+            append_extreme(S, S->piece.phase + S->fl.omega * t, at.value, S->sign);
+        S->sign = sign;
+    } else if (S->piece.kind == FLIGHT && S->rate_old * at.slope > 0.0 &&
+               (i == 1 || S->rate_older * S->rate_old > 0.0)) {
+        look_between(S, i, t, at.slope);
+    }
+    S->t_older = S->t_old;
+    S->rate_older = S->rate_old;
+    S->t_old = t;
+    S->rate_old = at.slope;
+}
+
+/* go through the samples of piece n; `moved` is the fastest motion in contact */
+static void search_piece(Search *S, const Record *rec, int64_t n, double moved)
+{
+    Piece *piece = &S->piece;
+    const Gauss *tab = piece->tab;
+    begin_piece(piece, rec, n);
+    double seen = larger(S->fl.omega, leave_unseen(S));
+    bool flight = piece->kind == FLIGHT;
+    if (!flight) seen = larger(seen, moved);
+    double wanted = ceil(piece->h * seen * (PER_HALF_WAVE / PI));
+    S->n_samples = (int64_t)smaller(wanted, MOST_SAMPLES) + 1 + (flight ? 0 : tab->m);
+    if (!flight) make_weights(S);
+    for (int b = 0; flight && b < S->fl.n; b++)
+        S->steps[b] = block_exponential(block_of(&S->fl, b), piece->h / (double)S->n_samples);
+    for (int64_t i = 0; i <= S->n_samples; i++) {
+        if (i % 1024 == 1023 && interrupted(&S->watch)) return;
+        double x = (double)i / (double)S->n_samples;
+        double t = piece->h * (flight ? x : map_fraction(tab, piece->kind, x));
+        if (flight)
+            next_in_flight(S, i);
+        else
+            state_in_contact(piece, weights_at(S, i), t, S->w);
+        look_at(S, n, i, t);
+    }
+}
+
+/* give a search its memory, or measure it; `more` is the number of terms of a base */
+static void lay_out_search(Block *block, const System *sys, const Gauss *tab, size_t more,
+                           Search *S)
+{
+    lay_out_flow(block, sys, 0, NULL, &S->fl);
+    lay_out_piece(block, &S->fl, tab, &S->piece);
+    S->terms = room(block, most_terms(sys) + more, sizeof(Term));
+    S->forced = room(block, 1 + most_terms(sys) + more, sizeof(Complex));
+    S->w = numbers(block, S->fl.size);
+    S->v = numbers(block, S->fl.size);
+    S->weights = numbers(block, (size_t)(KEPT_WEIGHTS + 1) * tab->m);
+    S->fresh = numbers(block, tab->m);
+    S->steps = room(block, S->fl.n, sizeof(Square));
+}
+
+/* the terms of the output: those of the response, and Σ Re(amplitudes e^{i orders ωt}) of a base */
+static void begin_output(Search *S, int out, int64_t more, const double *orders,
+                         const Complex *amplitudes)
+{
+    const Flow *fl = &S->fl;
+    S->row = row_of(fl, 0, out);
+    S->row1 = row_of(fl, 1, out);
+    S->n_terms = fl->n_terms + (int)more;
+    for (int p = 0; p <= fl->n_terms; p++) {
+        S->forced[p] = forced_of(fl, p, 0, out);
+        if (p > 0) S->terms[p - 1] = fl->terms[p - 1];
+    }
+    for (int p = 0; p < more; p++) {
+        S->forced[1 + fl->n_terms + p] = amplitudes[p];
+        S->terms[fl->n_terms + p] = (Term){STEADY, orders[p], {0.0, 0.0}};
+    }
+}
+
+/* Fill phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output,
+ * (capacity, 3); `count` tells how many there are, also of those that had no room.
+ *
+ * The rate is sampled sixteen times per period of the fastest mode that `leave_unseen` leaves, or
+ * that stops move in contact; its sign changes are refined. In flight, where a parabola through
+ * three samples of one sign comes near zero, it is looked for a change of sign there: two extremes
+ * closer than the samples. So it is behind the first, which may be an impact, by the rate's slope.
+ * The motion is taken as periodic: an extreme at its start counts once. */
+EXPORT int64_t nldyn_local_extremes(const Host *host, const System *sys, const Gauss *tab,
+                                    const Record *rec, double omega, int64_t out, int64_t more,
+                                    const double *orders, const Complex *amplitudes,
+                                    int64_t capacity, double *found, int64_t *count)
+{
+    Search S = {.found = found, .capacity = capacity, .kept = -1};
+    Block block = {NULL, 0};
+    lay_out_search(&block, sys, tab, more, &S);
+    char *memory = malloc(block.used);
+    if (!memory) return OUT_OF_MEMORY;
+    block = (Block){memory, 0};
+    lay_out_search(&block, sys, tab, more, &S);
+    begin_watch(&S.watch, host);
+    S.fl.watch = &S.watch;
+    at_frequency(sys, omega, NULL, &S.fl);
+    begin_output(&S, (int)out, more, orders, amplitudes);
+    double moved = fastest_moved(sys);
+    for (int64_t n = 0; n < rec->used[0] && !S.watch.stopped; n++) {
+        search_piece(&S, rec, n, moved);
+        interrupted(&S.watch);
+    }
+    if (S.sign != S.first_sign) append_extreme(&S, rec->phase[0], S.first_value, S.sign);
+    *count = S.count;
+    end_watch(&S.watch);
+    free(memory);
+    return S.watch.stopped ? INTERRUPTED : OK;
+}

@@ -1,0 +1,137 @@
+/* The force of a stop and its derivatives. */
+#include "engine.h"
+
+/* k δ^p (1 + a v) + c v [Hunt and Crossley 1975, eq. 9; Kelvin and Voigt's for a = 0]; zero where
+ * the stop is open */
+static Force power_law(const Stop *stop, double delta, double speed)
+{
+    if (delta <= 0.0) return (Force){0.0, 0.0, 0.0};
+    double slope = stop->stiffness;
+    if (stop->exponent == 1.5)
+        slope *= sqrt(delta);
+    else if (stop->exponent != 1.0)
+        slope *= pow(delta, stop->exponent - 1.0);
+    double factor = 1.0 + stop->dissipation * speed;
+    return (Force){slope * delta * factor + stop->dashpot * speed, stop->exponent * slope * factor,
+                   stop->dissipation * slope * delta + stop->dashpot};
+}
+
+typedef void Law(double depth, double speed, double out[3]);
+
+/* the law at an address, ``void law(double depth, double speed, double out[3])`` */
+static Force call_law(int64_t address, double depth, double speed)
+{
+    double out[3] = {0.0, 0.0, 0.0};
+    ((Law *)(intptr_t)address)(depth, speed, out);
+    return (Force){out[0], out[1], out[2]};
+}
+
+static bool is_bond(const Flow *fl, int s) { return stop_of(fl, s)->bond != 0.0; }
+
+static bool is_rigid(const Flow *fl, int s) { return stop_of(fl, s)->restitution >= 0.0; }
+
+/* whether a stop with a dashpot lets go where its force would pull */
+static bool never_pulls(const Flow *fl, int s) { return stop_of(fl, s)->release >= 0.0; }
+
+/* force of a bond, Σ k_j u^j + (drag u² + cubic u'²) u', and its two derivatives */
+static Force bond_law(const Flow *fl, int s, double u, double speed)
+{
+    const Stop *bond = stop_of(fl, s);
+    const double *numbers = (const double *)bond;
+    double secant = 0.0, bend = 0.0; /* Σ k_j u^(j - 1), and its derivative */
+    for (int c = fl->n_columns - 1; c >= FIRST_POWER; c--) {
+        bend = bend * u + secant;
+        secant = secant * u + numbers[c];
+    }
+    double viscosity = bond->drag * u * u + bond->cubic * speed * speed;
+    return (Force){u * secant + viscosity * speed,
+                   secant + u * bend + 2.0 * bond->drag * u * speed,
+                   viscosity + 2.0 * bond->cubic * speed * speed};
+}
+
+/* coefficient of restitution of a rigid stop at an impact speed, and its derivative by it */
+static Value restitution_at(const Flow *fl, int s, double speed)
+{
+    if (fl->laws[s] == 0) return (Value){stop_of(fl, s)->restitution, 0.0};
+    Force found = call_law(fl->laws[s], 0.0, speed);
+    return (Value){found.force, found.viscosity};
+}
+
+/* force of a stop that is closed */
+static Force pressing_law(const Flow *fl, int s, double delta, double speed)
+{
+    if (fl->laws[s] != 0) return call_law(fl->laws[s], delta, speed);
+    return power_law(stop_of(fl, s), delta, speed);
+}
+
+/* contact force of an elastic stop and its derivatives by penetration and speed */
+static Force law(const Flow *fl, int s, double delta, double speed)
+{
+    const Stop *stop = stop_of(fl, s);
+    Force none = {0.0, 0.0, 0.0};
+    if (is_bond(fl, s)) return bond_law(fl, s, delta, speed);
+    if (delta <= 0.0 || is_rigid(fl, s)) return none;
+    if (never_pulls(fl, s) && stop->stiffness * delta < -stop->dashpot * speed) return none;
+    return pressing_law(fl, s, delta, speed);
+}
+
+/* The same within a panel on which the stop is closed. There a law whose slope sets in almost at
+ * once goes on beyond the switch, as an odd function: the outermost node may come to lie on its
+ * other side, and would drop the whole stiffness. So does a dashpot. A rigid stop makes the
+ * acceleration vanish, which stands in for the penetration. */
+static Force closed_law(const Flow *fl, int s, double delta, double speed)
+{
+    const Stop *stop = stop_of(fl, s);
+    if (is_rigid(fl, s)) return (Force){delta / stop->mobility, 1.0 / stop->mobility, 0.0};
+    if (is_bond(fl, s)) return law(fl, s, delta, speed);
+    if (delta > 0.0) return pressing_law(fl, s, delta, speed);
+    double dashpot = stop->dashpot;
+    if (stop->exponent < ROUND) {
+        Force odd = pressing_law(fl, s, -delta, speed);
+        return (Force){2.0 * dashpot * speed - odd.force, odd.stiffness,
+                       2.0 * dashpot - odd.viscosity};
+    }
+    return (Force){dashpot * speed, 0.0, dashpot};
+}
+
+/* whether a force depends on the speed of penetration, as far as one knows */
+static bool depends_on_speed(const Flow *fl, int s)
+{
+    const Stop *stop = stop_of(fl, s);
+    bool lossy = stop->dissipation != 0.0 || stop->dashpot != 0.0 || stop->drag != 0.0 ||
+                 stop->cubic != 0.0;
+    return !is_rigid(fl, s) && (fl->laws[s] != 0 || lossy);
+}
+
+/* whether it does, or is to be differentiated by what makes it do so */
+static bool needs_speed(const Flow *fl, int s)
+{
+    bool needed = depends_on_speed(fl, s);
+    for (int c = 0; c < fl->n_parameters; c++) {
+        int64_t column = fl->parameters[2 * c];
+        bool viscous = column == DISSIPATION || column == DASHPOT;
+        needed = needed || (viscous && fl->parameters[2 * c + 1] == s);
+    }
+    return needed;
+}
+
+/* derivative of a stop's force with respect to its own number in a column of `stops` */
+static double law_by(const Flow *fl, int s, int64_t column, double delta, double speed)
+{
+    const Stop *stop = stop_of(fl, s);
+    if (column >= FIRST_POWER) return pow(delta, (double)(column - FIRST_POWER + 1));
+    Force found = closed_law(fl, s, delta, speed);
+    if (column == GAP) return -found.stiffness;
+    if (column == DASHPOT) return speed;
+    double force = found.force - stop->dashpot * speed;
+    if (column == STIFFNESS) return force / stop->stiffness;
+    if (column == EXPONENT) return delta > 0.0 ? force * log(delta) : 0.0;
+    return speed * force / (1.0 + stop->dissipation * speed); /* column == DISSIPATION */
+}
+
+/* whether the slope of a stop's force is singular at its switch */
+static bool singular_slope(const Flow *fl, int s)
+{
+    double exponent = stop_of(fl, s)->exponent;
+    return (fl->laws[s] != 0 || exponent != floor(exponent)) && !is_rigid(fl, s);
+}

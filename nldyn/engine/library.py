@@ -1,0 +1,108 @@
+"""The compiled library: where it lies, which of its forms fits the processor, its link to Python.
+
+It knows nothing of Python: threads, interruption and BLAS are handed over as addresses. It is
+called with Python's lock held; long functions give it back meanwhile, and look from time to time
+whether a signal came, whose handler's exception the call then raises.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import struct
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cython_blas
+
+FOLDER = Path(__file__).parent
+SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+NOT_BUILT = (
+    "nldyn: the engine is not built; install the package anew with 'pip install .', "
+    "or with a C compiler in $CC"
+)
+
+
+def library_name(level: str = "") -> str:
+    """File of the library for a level of the processor, "" for all or "v3"."""
+    return f"engine{level}{SUFFIX}"
+
+
+def _load() -> ctypes.PyDLL:
+    """The library's best form for this processor."""
+    base = FOLDER / library_name()
+    if not base.exists():
+        raise ImportError(f"{NOT_BUILT} (no {base})")
+    library = ctypes.PyDLL(str(base))
+    wider = FOLDER / library_name("v3")
+    if wider.exists() and library.nldyn_runs_v3():
+        return ctypes.PyDLL(str(wider))
+    return library
+
+
+def address_of(array: NDArray[Any]) -> int:
+    """Address of an array's first number."""
+    return array.ctypes.data
+
+
+class Packed:
+    """Numbers and arrays as the engine reads them: eight bytes each, an array by its address.
+
+    Parameters
+    ----------
+    *fields : int, float or array
+        In the order of the C structure.
+
+    Examples
+    --------
+    >>> Packed(3, 0.5, np.zeros(2))
+    <Packed of 3 fields>
+    """
+
+    def __init__(self, *fields: int | float | NDArray[Any]) -> None:
+        # whose memory must live
+        self.fields = [np.ascontiguousarray(f) if isinstance(f, np.ndarray) else f for f in fields]
+        form = "".join("d" if isinstance(field, float) else "q" for field in fields)
+        numbers = [address_of(f) if isinstance(f, np.ndarray) else f for f in self.fields]
+        self.content = struct.pack(form, *numbers)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Addresses are those of this process."""
+        return Packed, tuple(self.fields)
+
+    def __repr__(self) -> str:
+        return f"<Packed of {len(self.fields)} fields>"
+
+
+def _capsule(name: str) -> int:
+    """Address of a function of BLAS, as scipy hands it to compiled code."""
+    capsule = cython_blas.__pyx_capi__[name]
+    api = ctypes.pythonapi
+    api.PyCapsule_GetName.restype = ctypes.c_char_p
+    api.PyCapsule_GetName.argtypes = [ctypes.py_object]
+    api.PyCapsule_GetPointer.restype = ctypes.c_void_p
+    api.PyCapsule_GetPointer.argtypes = [ctypes.py_object, ctypes.c_char_p]
+    return int(api.PyCapsule_GetPointer(capsule, api.PyCapsule_GetName(capsule)))
+
+
+def _function(name: str) -> int:
+    """Address of a function of Python."""
+    return int(ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value or 0)
+
+
+LIBRARY = _load()
+HOST = Packed(
+    _function("PyEval_SaveThread"),
+    _function("PyEval_RestoreThread"),
+    _function("PyErr_CheckSignals"),
+    _capsule("dgemm"),
+).content
+
+
+def function(name: str, *arguments: Any, result: Any = ctypes.c_int64) -> Any:
+    """A function of the library with the types of its arguments."""
+    found = LIBRARY[name]
+    found.argtypes, found.restype = arguments, result
+    return found

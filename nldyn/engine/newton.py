@@ -1,0 +1,171 @@
+"""Newton's method for the shooting equations, and the flow map alone, in the engine."""
+
+from __future__ import annotations
+
+import ctypes
+import struct
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nldyn.base.arrays import Complex, Real
+from nldyn.engine.layout import OUT_OF_MEMORY, Record, SystemData
+from nldyn.engine.library import HOST, Packed, address_of, function
+from nldyn.engine.numbers import reals
+
+_TASK = struct.Struct("8q6d13q")  # the structure Task of newton.c
+_newton = function("nldyn_newton", *[ctypes.c_char_p] * 5)
+
+
+class Corrector(NamedTuple):
+    """What Newton's method for the shooting equations needs to know.
+
+    Parameters
+    ----------
+    row, level : (N + 1,), float
+        The plane ``row @ point = level`` on which to stay.
+    state_weight : float
+        Weight of a state's square in the squared length of a step (that of ln ω is 1).
+    rtol : float
+        Longest last step.
+    longest : float
+        Farthest distance of the first corrected point from `aim`: more means failure.
+    max_iterations : int
+        Most steps; none means the flow map alone.
+    aim : (N + 1,)
+        Where the point is expected.
+    closings : int
+        How often stops close in the motion from the guess, or it fails; -1 for any number.
+    turn : float
+        Least cosine of the first tangent and the normal of the plane, in the metric, or it fails.
+    """
+
+    row: Real
+    level: float
+    state_weight: float
+    rtol: float
+    longest: float
+    max_iterations: int
+    aim: Real
+    closings: int
+    turn: float
+
+
+class Found(NamedTuple):
+    """What comes of a call.
+
+    Parameters
+    ----------
+    outcome : int
+        `OK`, `DIVERGED`, `SINGULAR`, `NOT_CONVERGED` or why the flow map failed.
+    iterations : int
+    first, last : float
+        Lengths of the first and the last step.
+    along : (N + 1,)
+        Vector along the branch, of no particular length.
+    ends, jacobians, d_omegas, d_parameters : (k, 2n), (k, 2n, 2n), (k, 2n), (k, 2n, n_parameters)
+        Of the segments, at the point before the last step, where the record is from, too.
+    closings : (n_stops,)
+        How often each stop closed.
+    """
+
+    outcome: int
+    iterations: int
+    first: float
+    last: float
+    along: Real
+    ends: Real
+    jacobians: Real
+    d_omegas: Real
+    d_parameters: Real
+    closings: NDArray[np.int64]
+
+
+def packed_system(system: SystemData) -> Packed:
+    """A system's numbers as the engine reads them."""
+    blocks, rows, bound3, force, orders, drive, stops, laws, tail, node_angle = system
+    return Packed(
+        len(blocks), rows.shape[1], len(stops), stops.shape[1], orders.size,
+        *(np.ascontiguousarray(array) for array in (
+            blocks, rows, bound3, force, orders, drive.astype(complex), stops, laws)),
+        tail, node_angle,
+    )  # fmt: skip
+
+
+def packed_record(record: Record) -> Packed:
+    """A record's arrays as the engine fills them."""
+    return Packed(record.phase.size, *record)
+
+
+def newton(
+    system: Packed,
+    tables: Packed,
+    record: Packed,
+    recording: bool,
+    omega: float,
+    point: Real,
+    phases: Real,
+    chained: bool,
+    with_columns: bool,
+    parameters: NDArray[np.int64],
+    drive_by: Complex,
+    corrector: Corrector,
+    size: int,
+    n_stops: int,
+) -> Found:
+    """Newton's method for the shooting equations on a plane, in place, or the flow map alone.
+
+    Parameters
+    ----------
+    system, tables, record : Packed
+        What is propagated, the collocation tables, and where the pieces are recorded.
+    recording : bool
+        Whether to record.
+    omega : float
+        Excitation frequency, of the flow map alone.
+    point : (N + 1,)
+        States at the k phases and ln ω; the guess, then the solution.
+    phases : (k + 1,)
+        Forcing phases of the segment ends.
+    chained : bool
+        Whether only the first node is used and each segment starts where the last one ended.
+    with_columns : bool
+        Whether to carry sensitivities.
+    parameters, drive_by : (n, 2), (n, h, 3, 2n)
+        Column of `StopRow`, or -1, and stop of each parameter; derivatives of `SystemData.drive`.
+    corrector : Corrector
+        The plane and when to stop.
+    size, n_stops : int
+        Of the state, and of the stops and bonds.
+    """
+    row, level, state_weight, rtol, longest, max_iterations, aim, wanted, turn = corrector
+    row, aim, phases = reals(row), reals(aim), reals(phases)
+    k, n, count = phases.size - 1, point.size, len(parameters)
+    kept = k if with_columns else 1
+    jacobians, closings = np.empty((kept, size, size)), np.empty(n_stops, dtype=np.int64)
+    lengths = 3, n, k * size, kept * size, kept * size * count
+    numbers = np.zeros(sum(lengths))
+    told = address_of(numbers)
+    along = told + 24
+    ends = along + 8 * n
+    d_omegas = ends + 8 * k * size
+    task = _TASK.pack(
+        recording, chained, with_columns, k, n, count, max_iterations, wanted,
+        omega, level, state_weight, rtol, longest, turn,
+        address_of(point), address_of(phases), address_of(parameters), address_of(drive_by),
+        address_of(row), address_of(aim), told, along, ends, address_of(jacobians), d_omegas,
+        d_omegas + 8 * kept * size, address_of(closings),
+    )  # fmt: skip
+    outcome = _newton(HOST, system.content, tables.content, record.content, task)
+    if outcome == OUT_OF_MEMORY:
+        raise MemoryError("no memory for a motion with so many modes and stops")
+    iterations, first, last = numbers[:3].tolist()
+    start, parts = 3, []
+    for length in lengths[1:]:
+        parts.append(numbers[start : start + length])
+        start += length
+    return Found(
+        outcome, int(iterations), first, last, parts[0], parts[1].reshape(k, size), jacobians,
+        parts[2].reshape(kept, size), parts[3].reshape(kept, size, count), closings,
+    )  # fmt: skip

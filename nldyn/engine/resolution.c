@@ -1,0 +1,341 @@
+/* Whether a panel resolves the contact, and where what it shows changes its sign. */
+#include "engine.h"
+
+#define SHALLOW 16.0 /* a lowest point so low a part of the curvature all but opens the stop */
+#define DAMPED_TAIL 0.01 /* of the usual one, where a stop damps strongly */
+#define REACH 0.05 /* of the interval: where the next parabola's places lie beside its lowest point */
+#define CLEAR 0.1  /* of the largest: a lowest value above it is not near zero in between either */
+#define PLACED 1e-6 /* relative: error of the place where a panel is to be cut */
+
+/* Legendre coefficient of the polynomial through values (m,) */
+static inline double legendre_coefficient(const Gauss *tab, const double *values, int degree)
+{
+    double total = 0.0;
+    const double *row = tab->to_legendre + (size_t)degree * tab->m;
+    for (int j = 0; j < tab->m; j++) total += row[j] * values[j];
+    return total;
+}
+
+/* larger of the last two of these coefficients */
+static double legendre_tail(const Gauss *tab, const double *values)
+{
+    int m = (int)tab->m;
+    return larger(fabs(legendre_coefficient(tab, values, m - 2)),
+                  fabs(legendre_coefficient(tab, values, m - 1)));
+}
+
+/* value at the end of the panel of the same polynomial: each of Legendre's is 1 there */
+static double at_end(const Gauss *tab, const double *values)
+{
+    double total = 0.0;
+    for (int degree = 0; degree < tab->m; degree++)
+        total += legendre_coefficient(tab, values, degree);
+    return total;
+}
+
+/* its value at the start, where Legendre's polynomials alternate */
+static double at_start(const Gauss *tab, const double *values)
+{
+    double total = 0.0;
+    for (int degree = 0; degree < tab->m; degree++) {
+        double share = legendre_coefficient(tab, values, degree);
+        total += degree % 2 ? -share : share;
+    }
+    return total;
+}
+
+/* its slope at the end over the stretched time of a panel: n (n + 1) of each of Legendre's */
+static double slope_at_end(const Gauss *tab, const double *values)
+{
+    double total = 0.0;
+    for (int degree = 0; degree < tab->m; degree++)
+        total += degree * (degree + 1) * legendre_coefficient(tab, values, degree);
+    return total;
+}
+
+/* largest absolute value */
+static double largest(const double *values, int m)
+{
+    double found = 0.0;
+    for (int j = 0; j < m; j++) found = larger(found, fabs(values[j]));
+    return found;
+}
+
+/* slope (value) and curvature (slope), at its middle, of the parabola through values at left, 0
+ * and right */
+static Value parabola(double left, double right, double below, double here, double above)
+{
+    double up = (below - here) / left, on = (above - here) / right;
+    double curvature = (on - up) / (right - left);
+    return (Value){up - curvature * left, curvature};
+}
+
+/* whether penetrations have a minimum so low that their slope is nearly singular there: the
+ * parabola through it vanishes at a complex pair nearer than a quarter of the panel */
+static bool nearly_opens(const Gauss *tab, int kind, const double *values, double noise)
+{
+    const double *chi = tab->chi + (size_t)kind * tab->m;
+    for (int i = 1; i < tab->m - 1; i++) {
+        if (!(values[i - 1] >= values[i] && values[i] <= values[i + 1])) continue;
+        Value at = parabola(chi[i - 1] - chi[i], chi[i + 1] - chi[i], values[i - 1], values[i],
+                            values[i + 1]);
+        if (!(at.slope > 0.0)) continue;
+        double lowest = values[i] - 0.25 * at.value * at.value / at.slope;
+        if (noise < lowest && lowest < at.slope / SHALLOW) return true;
+    }
+    return false;
+}
+
+/* Legendre tail, beside its largest, of the response (2n, m) of the modes to a stop; each mode
+ * counts by its share in the mobility */
+static double response_tail(const Flow *fl, const Gauss *tab, int stop, const double *back)
+{
+    double worst = 0.0, mobility = TINY;
+    int m = (int)tab->m;
+    for (int b = 0; b < fl->n; b++) {
+        double tail = 0.0, size = TINY, share = 0.0;
+        for (int k = 2 * b; k < 2 * b + 2; k++) {
+            double row = fabs(row_of(fl, 1, stop)[k]);
+            tail = larger(tail, row * legendre_tail(tab, back + (size_t)k * m));
+            size = larger(size, row * largest(back + (size_t)k * m, m));
+            share += row * fabs(push_of(fl, stop)[k]);
+        }
+        worst = larger(worst, share * tail / size);
+        mobility += share;
+    }
+    return worst / mobility;
+}
+
+/* whether the stiffness of the closed stops sways too fast for a panel: a force that hardly
+ * changes tells nothing of how a change of the motion sways on them, so it is held to the bound of
+ * the structure's fastest mode */
+static bool sways_unseen(const Flow *fl, const Gauss *tab, int kind, double h, const Panel *panel)
+{
+    double stiffness = 0.0;
+    for (int a = 0; a < panel->na; a++)
+        if (!is_rigid(fl, panel->active[a]))
+            stiffness += stop_of(fl, panel->active[a])->mobility *
+                         largest(piece_row(panel->slope, a, panel->m), panel->m);
+    double longest = fl->node_angle * panel->m * (kind == 0 ? 1.0 : MAPPED / tab->power);
+    return h * sqrt(stiffness) > larger(longest, HALF_CONTACT);
+}
+
+/* fill the tails of the responses to the stops and of their squares, each (na,) */
+static void fill_response_tails(const Flow *fl, const Gauss *tab, const Panel *panel, Scratch *s)
+{
+    size_t count = (size_t)fl->size * panel->m;
+    for (int a = 0; a < panel->na; a++) {
+        const double *back = panel->back + a * count;
+        double tail = larger(response_tail(fl, tab, panel->active[a], back), fl->tail);
+        s->forced[a] = s->swayed[a] = tail;
+        if (tail > fl->tail) { /* what a slope acts on sways like what it leads to */
+            for (size_t i = 0; i < count; i++) s->square[i] = back[i] * back[i];
+            s->swayed[a] = larger(tail, response_tail(fl, tab, panel->active[a], s->square));
+        }
+    }
+}
+
+/* whether the force (o < na) and the slope of an output are resolved */
+static bool output_resolved(const Flow *fl, const Gauss *tab, int kind, double h,
+                            const double *noise, const Panel *panel, const Scratch *s, int o)
+{
+    int na = panel->na, m = panel->m, a = o % na, closed = panel->active[a];
+    const Stop *stop = stop_of(fl, closed);
+    const double *F = panel->F + (size_t)a * m, *slopes = s->slopes + (size_t)o * m;
+    double deepest = largest(panel->output + (size_t)a * m, m);
+    if (deepest <= 10.0 * noise[a]) return true;
+    if (o < na && singular_slope(fl, closed) &&
+        nearly_opens(tab, kind, panel->output + (size_t)a * m, 10.0 * noise[a]))
+        return false;
+    double goal = panel->decay[a] <= DECAY ? fl->tail : DAMPED_TAIL * fl->tail; /* hold_speeds */
+    if (1.0 < stop->exponent && stop->exponent < ROUND) goal *= SHARP_TAIL;
+    if (is_rigid(fl, closed)) goal *= REST_TAIL;
+    double floor = BLIND * noise[a] / deepest;
+    double tail = larger(goal * fl->tail / s->forced[a], floor);
+    double shake = 0.0; /* of the force by rounding: terms of a bond cancel where it is at rest */
+    if (is_bond(fl, closed)) shake = BLIND * noise[a] * largest(panel->slope + (size_t)a * m, m);
+    if (o < na && na < panel->outputs)
+        shake += BLIND * noise[na + a] * largest(panel->slope + (size_t)(na + a) * m, m);
+    if (o < na && legendre_tail(tab, F) > tail * largest(F, m) + shake) return false;
+    shake *= stop->exponent / deepest * largest(tab->slope + (size_t)kind * m, m);
+    double size = largest(slopes, m), fastest = largest(panel->output + (size_t)o * m, m);
+    if (o >= na && fastest > 0.0) /* by speed: its share in the force counts */
+        size = larger(size, largest(F, m) / fastest);
+    double kick = 1.0;
+    if (o < na && !is_rigid(fl, closed)) {
+        kick = KICK * stop->mobility * largest(panel->slope + (size_t)o * m, m);
+        kick = larger(kick * h / fl->omega, 1.0);
+    }
+    tail = larger(goal * fl->tail / (s->swayed[a] * sqrt(kick)), floor);
+    return !(legendre_tail(tab, slopes) > 4.0 * (tail * size + shake));
+}
+
+/* Whether the Legendre tails of each force and of its slopes are small beside their largest.
+ *
+ * Where the rate of penetration comes close to one without force, its rounding is all there is to
+ * see. A slope counts as it does in the sensitivities: times dχ/ds. Where contacts are short
+ * against the period, it kicks them to many times their final size, and its error, the square of
+ * the tail, with them. What a force or a slope does over a panel is off by the product of its tail
+ * and that of the response to it, or of the response's square. */
+static bool resolved(const Flow *fl, const Gauss *tab, int kind, double h, const double *noise,
+                     const Panel *panel, Scratch *s)
+{
+    if (sways_unseen(fl, tab, kind, h, panel)) return false;
+    const double *stretch = tab->slope + (size_t)kind * panel->m;
+    for (int o = 0; o < panel->outputs; o++)
+        for (int i = 0; i < panel->m; i++)
+            s->slopes[o * panel->m + i] = panel->slope[o * panel->m + i] * stretch[i];
+    fill_response_tails(fl, tab, panel, s);
+    for (int o = 0; o < panel->outputs; o++)
+        if (!output_resolved(fl, tab, kind, h, noise, panel, s, o)) return false;
+    return true;
+}
+
+/* whether a panel shows what each stop damps, or nothing is left of it; fills `decay` */
+static bool shows_decay(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel)
+{
+    int na = panel->na, m = panel->m;
+    bool shown = true;
+    for (int o = na; o < panel->outputs; o++) {
+        int a = o - na;
+        double total = 0.0, mobility = stop_of(fl, panel->active[a])->mobility;
+        for (int i = 0; i < m; i++)
+            total += h * tab->weights[kind * m + i] * (mobility * panel->slope[o * m + i]);
+        panel->decay[a] = total;
+        shown = shown && (total <= DECAY || panel->decayed[a] > FADED);
+    }
+    return shown;
+}
+
+/* fraction of the panel that belongs to the stretched time s (see `gauss.time_map`) */
+static double map_fraction(const Gauss *tab, int kind, double s)
+{
+    bool square = tab->power == 2;
+    if (kind == 0) return s;
+    if (kind == 1) {
+        double left = (1.0 - s) * (1.0 - s);
+        return 1.0 - (square ? left : left * left);
+    }
+    if (kind == 2) return square ? s * s : s * s * s * s;
+    if (square) return 0.5 - 0.5 * cos(PI * s);
+    return s * s * s * s * (35.0 - s * (84.0 - s * (70.0 - 20.0 * s)));
+}
+
+/* polynomial through the values at 0, the nodes and 1, at s (barycentric formula) */
+static double interpolate(const Gauss *tab, const double *values, double s)
+{
+    double top = 0.0, bottom = 0.0;
+    for (int j = 0; j < tab->m + 2; j++) {
+        double away = s - tab->ends_nodes[j];
+        if (away == 0.0) return values[j];
+        double weight = tab->barycentric[j] / away;
+        top += weight * values[j];
+        bottom += weight;
+    }
+    return top / bottom;
+}
+
+/* how low (value) the polynomial through `values` is between three places, and where (slope) */
+static Value minimum_beside(const Gauss *tab, const double *values, const double *places,
+                            const double *heights)
+{
+    double here = places[1], height = heights[1], left = places[0], right = places[2];
+    double below = heights[0], above = heights[2];
+    for (int i = 0; i < 3; i++) {
+        if (!(left < here && here < right)) break;
+        Value at = parabola(left - here, right - here, below, height, above);
+        if (!(at.slope > 0.0)) break;
+        double reach = REACH * (right - left);
+        here = smaller(larger(here - 0.5 * at.value / at.slope, left), right);
+        left = larger(here - reach, places[0]);
+        right = smaller(here + reach, places[2]);
+        height = interpolate(tab, values, here);
+        below = interpolate(tab, values, left);
+        above = interpolate(tab, values, right);
+    }
+    return (Value){height, here};
+}
+
+/* fill the polynomial through `values` on a grid four times as fine as the nodes */
+static void refine(const Gauss *tab, const double *values, double *fine)
+{
+    int count = (int)tab->m + 2;
+    for (int i = 0; i < tab->n_fine; i++) {
+        double total = 0.0;
+        for (int j = 0; j < count; j++) total += tab->to_fine[(size_t)i * count + j] * values[j];
+        fine[i] = total;
+    }
+}
+
+/* where a polynomial that is `above` at `low` and negative at `high` changes its sign */
+static double refined_root(const Gauss *tab, const double *values, double low, double above,
+                           double high)
+{
+    double under = interpolate(tab, values, high);
+    for (int step = 0; step < 60; step++) {
+        double middle = 0.5 * (low + high);
+        if (step % 3 != 2) middle = low + (high - low) * above / (above - under);
+        double value = interpolate(tab, values, middle);
+        if (value > 0.0) {
+            low = middle;
+            above = value;
+        } else {
+            high = middle;
+            under = value;
+        }
+        if (high - low <= PLACED * high || value == 0.0) break;
+    }
+    return high;
+}
+
+/* first s at which the polynomial through `values` falls below -noise, at its end edge, or 2; it
+ * is looked at on the fine grid, and at the minima between */
+static double first_root(const Gauss *tab, const double *values, const double *fine, double noise,
+                         double edge)
+{
+    const double *grid = tab->fine_grid;
+    int n = (int)tab->n_fine;
+    for (int i = 1; i < n; i++) {
+        double below = -1.0;
+        if (fine[i] < (i < n - 1 ? -noise : edge)) {
+            below = grid[i];
+        } else if (i < n - 1 && fine[i - 1] >= fine[i] && fine[i] <= fine[i + 1] &&
+                   fine[i] < 0.5 * larger(fine[i - 1], fine[i + 1])) { /* near zero in between */
+            Value bottom = minimum_beside(tab, values, grid + i - 1, fine + i - 1);
+            if (bottom.value < -noise) below = bottom.slope;
+        }
+        if (below < 0.0) continue;
+        int last = i - 1;
+        while (last > 0 && fine[last] <= 0.0) last--;
+        if (fine[last] <= 0.0) return 0.5 * below;
+        return refined_root(tab, values, grid[last], fine[last], below);
+    }
+    return 2.0;
+}
+
+/* Where the polynomial through `values` first dips to zero within an error, or 2. Beside a switch
+ * at an end of the panel, where the value is rounding, it must have left that band before and
+ * leave it behind. */
+static double first_doubt(const Gauss *tab, const double *values, const double *fine,
+                          double rounding, double error)
+{
+    int last = (int)tab->n_fine - 1;
+    double where = 2.0, lowest = fine[0], highest = fine[0];
+    for (int i = 1; i <= last; i++) {
+        lowest = smaller(lowest, fine[i]);
+        highest = larger(highest, fine[i]);
+    }
+    if (lowest > CLEAR * highest) return 2.0; /* not near zero between the places either */
+    bool came = fine[0] > 100.0 * rounding;
+    for (int i = 1; i <= last; i++) {
+        came = came || fine[i - 1] > 10.0 * error;
+        if (came && where > 1.0 && i > 1 && fine[i - 2] > fine[i - 1] && fine[i - 1] <= fine[i]) {
+            Value bottom = minimum_beside(tab, values, tab->fine_grid + i - 2, fine + i - 2);
+            if (fabs(bottom.value) <= error) where = bottom.slope;
+        }
+        bool left_behind =
+            fine[i] > 10.0 * error || (i == last && fine[i] > 100.0 * rounding);
+        if (where <= 1.0 && left_behind) return where;
+    }
+    return 2.0;
+}

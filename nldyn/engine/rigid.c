@@ -1,0 +1,360 @@
+/* Rigid stops: impacts, at which velocities jump, and rest, in which a force holds the gap closed.
+ *
+ * An impact takes the impulse J = (1 + e) v / Σ c² from the modes, with the speed v at which the
+ * gap closes and the restitution e. Where several stops are hit at once, impacts follow each other
+ * within the instant, the fastest first, each with its own restitution, until no gap closes:
+ * energy never grows.
+ *
+ * A body rests on a stop where it would bounce no higher than rounding. The impacts that would
+ * follow have a finite sum in time and impulse: with the acceleration a towards the stop they take
+ * (1 + e) v + e v (1 + e) + ... = v + a Δt within Δt = 2 e v / (a (1 - e)), which is what an impact
+ * without rebound and the force of rest take. */
+#include "engine.h"
+
+#define ROUNDS 100 /* of impacts within one instant with restitution; then without */
+#define SHUT 10.0  /* roundings of a gap that is shut, and of a rate that is none */
+#define AT_START 1e5 /* the same at the start of a segment, whose state is known less well */
+#define SLOW 1e-7 /* share of the first speed below which impacts are no longer told apart */
+#define LOW 10.0 /* a body that would rebound no higher than this many roundings of the gap stays */
+#define HIT_AGAIN 1e-3 /* rad of the excitation, within which a body that pushes off hits again */
+
+/* fill the rigid stops on which a body rests; how many */
+static int resting_stops(const Motion *M)
+{
+    int n = 0;
+    for (int s = 0; s < M->fl->n_stops; s++)
+        if (M->closed[s] && is_rigid(M->fl, s)) M->s->resting[n++] = s;
+    return n;
+}
+
+/* fill and factor the speeds of closing per unit impulse of each of the `resting` stops, (n, n) */
+static void factor_mobilities(const Motion *M, int n)
+{
+    Scratch *s = M->s;
+    for (int a = 0; a < n; a++)
+        for (int b = 0; b < n; b++)
+            s->mobility[a * n + b] = between(M->fl, s->resting[a], s->resting[b]);
+    lu_factor(s->mobility, n, s->mobility_order);
+}
+
+/* fill s->stop_forces (n_stops,) of the closed stops, and s->pushes (n_stops,), the closing
+ * accelerations with them; those of rigid stops keep their accelerations at zero */
+static void contact_forces(const Motion *M, double phase)
+{
+    const Flow *fl = M->fl;
+    double *forces = M->s->stop_forces, *rates = M->s->pushes, *holding = M->s->held;
+    int n = fl->n_stops;
+    for (int s = 0; s < n; s++) {
+        Course at = output_now(fl, s, M->w, phase);
+        rates[s] = at.second;
+        forces[s] =
+            M->closed[s] ? law(fl, s, at.value - stop_of(fl, s)->gap, at.first).force : 0.0;
+    }
+    for (int b = 0; b < n; b++)
+        if (forces[b] != 0.0)
+            for (int s = 0; s < n; s++) rates[s] -= between(fl, s, b) * forces[b];
+    int count = resting_stops(M);
+    if (count == 0) return;
+    const int *stops = M->s->resting;
+    factor_mobilities(M, count);
+    for (int a = 0; a < count; a++) holding[a] = rates[stops[a]];
+    lu_apply_vector(M->s->mobility, count, M->s->mobility_order, holding);
+    for (int a = 0; a < count; a++) {
+        forces[stops[a]] = holding[a];
+        for (int s = 0; s < n; s++) rates[s] -= between(fl, s, stops[a]) * holding[a];
+    }
+}
+
+/* fill s->rate (2n,): rate of change of the homogeneous state with `stop_forces` at work */
+static void state_rate(const Motion *M)
+{
+    const Flow *fl = M->fl;
+    double *rate = M->s->rate;
+    for (int k = 0; k < fl->size; k++) rate[k] = 0.0;
+    add_rates(fl->blocks, fl->n, M->w, rate);
+    for (int s = 0; s < fl->n_stops; s++) {
+        const double *push = push_of(fl, s);
+        double force = M->s->stop_forces[s];
+        for (int k = 0; k < fl->size; k++) rate[k] -= push[k] * force;
+    }
+}
+
+/* rigid stop whose gap is shut and closes fastest, or -1, and that speed; that of the stop `first`
+ * counts as shut. Rates up to so many `roundings` are none. */
+static int hit_stop(const Motion *M, double phase, int first, double roundings, double *fastest)
+{
+    const Flow *fl = M->fl;
+    int hit = -1;
+    *fastest = 0.0;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!is_rigid(fl, s)) continue;
+        Course at = output_now(fl, s, M->w, phase);
+        double depth = at.value - stop_of(fl, s)->gap;
+        bool shut = s == first || depth >= -SHUT * output_noise(fl, s, M->w);
+        if (shut && at.first > larger(*fastest, roundings * rate_noise(fl, s, M->w))) {
+            hit = s;
+            *fastest = at.first;
+        }
+    }
+    return hit;
+}
+
+/* whether a rebound against an acceleration is lost in the rounding of the gap */
+static bool is_low(const Motion *M, int stop, double rebound, double push)
+{
+    return push > 0.0 &&
+           rebound * rebound <= 2.0 * LOW * output_noise(M->fl, stop, M->w) * push;
+}
+
+/* leave out of the stops on which a body is at rest those that it parts from */
+static void leave_parting(const Motion *M, double phase, bool *still)
+{
+    for (int s = 0; s < M->fl->n_stops; s++)
+        if (still[s])
+            still[s] = output_now(M->fl, s, M->w, phase).first >= -SHUT * rate_noise(M->fl, s, M->w);
+}
+
+/* whether column c of the parameters is a stop's own number */
+static bool is_parameter(const Flow *fl, int c, int64_t column, int stop)
+{
+    return fl->parameters[2 * c] == column && fl->parameters[2 * c + 1] == stop;
+}
+
+/* fill `shift` (n_columns,): change of the instant at which a gap closes */
+static void instant_shift(const Motion *M, int stop, double phase, double t, double *shift)
+{
+    const Flow *fl = M->fl;
+    double speed = output_now(fl, stop, M->w, phase).first;
+    output_columns(fl, stop, 0, phase, t, M->columns, M->n_columns, shift);
+    for (int c = 0; c < fl->n_parameters; c++)
+        if (is_parameter(fl, c, GAP, stop)) shift[fl->size + c] -= 1.0;
+    for (int c = 0; c < M->n_columns; c++) shift[c] = -shift[c] / speed;
+}
+
+/* add to sensitivities what s->rate makes of a shift in time (n_columns,), forth or back */
+static void move(Motion *M, double sign, const double *shift)
+{
+    const double *rate = M->s->rate;
+    for (int k = 0; k < M->fl->size; k++)
+        for (int c = 0; c < M->n_columns; c++)
+            M->columns[(size_t)k * M->n_columns + c] += rate[k] * (sign * shift[c]);
+}
+
+/* fill sensitivities of an output (order 0) or its rate at an instant that shifts, (n_columns,);
+ * the columns have the states' own */
+static void shifted_columns(const Motion *M, int stop, int order, double phase, double t,
+                            const double *shift, double *found)
+{
+    const Flow *fl = M->fl;
+    output_columns(fl, stop, order, phase, t, M->columns, M->n_columns, found);
+    /* the excitation's share of the rate alone: that of the state is in the columns */
+    Complex turn = product(forced_of(fl, 0, 0, stop), turned(phase));
+    Course more = swelling(fl, stop, phase);
+    double pace = order == 0 ? -fl->omega * turn.im + more.first
+                             : -fl->omega * fl->omega * turn.re + more.second;
+    for (int c = 0; c < M->n_columns; c++) found[c] += pace * shift[c];
+}
+
+/* one impact: the impulse on the state, and its sensitivities */
+static void strike(Motion *M, int stop, double speed, Value restitution, double phase, double t,
+                   const double *shift)
+{
+    const Flow *fl = M->fl;
+    double mobility = stop_of(fl, stop)->mobility, *by = M->s->moved;
+    double impulse = (1.0 + restitution.value) * speed / mobility;
+    const double *push = push_of(fl, stop);
+    if (M->with_columns) {
+        shifted_columns(M, stop, 1, phase, t, shift, by);
+        for (int c = 0; c < M->n_columns; c++)
+            by[c] *= (1.0 + restitution.value + restitution.slope * speed) / mobility;
+        for (int c = 0; c < fl->n_parameters; c++)
+            if (is_parameter(fl, c, RESTITUTION, stop)) by[fl->size + c] += speed / mobility;
+        for (int k = 0; k < fl->size; k++)
+            for (int c = 0; c < M->n_columns; c++)
+                M->columns[(size_t)k * M->n_columns + c] -= push[k] * by[c];
+    }
+    for (int k = 0; k < fl->size; k++) M->w[k] -= push[k] * impulse;
+}
+
+/* fill s->offsets (count, 1 + n): gaps (rate 0) of the `resting` stops or their rates, and their
+ * sensitivities */
+static void fill_offsets(const Motion *M, double phase, double t, const double *shift, int count,
+                         int rate, int n)
+{
+    const Flow *fl = M->fl;
+    for (int a = 0; a < count; a++) {
+        int stop = M->s->resting[a];
+        double *off = M->s->offsets + (size_t)a * (1 + n);
+        Course at = output_now(fl, stop, M->w, phase);
+        off[0] = rate == 1 ? at.first : at.value - stop_of(fl, stop)->gap;
+        if (n == 0) continue;
+        shifted_columns(M, stop, rate, phase, t, shift, off + 1);
+        for (int c = 0; c < fl->n_parameters; c++)
+            if (rate == 0 && is_parameter(fl, c, GAP, stop)) off[1 + fl->size + c] -= 1.0;
+    }
+}
+
+/* Shut the gaps of the stops that a body rests on, and stop their rates, in all sensitivities: by
+ * a shift of the displacements along what an impulse moves, and by an impulse. */
+static void hold(Motion *M, double phase, double t, const double *shift)
+{
+    const Flow *fl = M->fl;
+    Scratch *s = M->s;
+    int count = resting_stops(M), n = M->with_columns ? M->n_columns : 0;
+    if (count == 0) return;
+    factor_mobilities(M, count);
+    for (int rate = 0; rate < 2; rate++) {
+        fill_offsets(M, phase, t, shift, count, rate, n);
+        lu_apply(s->mobility, count, s->mobility_order, s->offsets, 1 + n);
+        for (int a = 0; a < count; a++) {
+            const double *push = push_of(fl, s->resting[a]);
+            const double *off = s->offsets + (size_t)a * (1 + n);
+            for (int k = 0; k < fl->size; k++) s->along[k] = rate == 0 ? 0.0 : push[k];
+            if (rate == 0) add_rates(fl->blocks, fl->n, push, s->along);
+            for (int k = 0; k < fl->size; k++) {
+                M->w[k] -= s->along[k] * off[0];
+                for (int c = 0; c < n; c++)
+                    M->columns[(size_t)k * n + c] -= s->along[k] * off[1 + c];
+            }
+        }
+    }
+}
+
+/* close the rigid stops that are shut and do not part; a body that an impact on another stop has
+ * lifted comes back, and stays where that is lost in the rounding of the gap */
+static void close_shut(Motion *M, int first, double phase, double roundings, const bool *struck)
+{
+    const Flow *fl = M->fl;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!is_rigid(fl, s)) continue;
+        Course at = output_now(fl, s, M->w, phase);
+        bool shut = s == first || M->closed[s] || struck[s];
+        double depth = at.value - stop_of(fl, s)->gap;
+        shut = shut || depth >= -roundings * output_noise(fl, s, M->w);
+        M->closed[s] = shut && fabs(at.first) <= roundings * rate_noise(fl, s, M->w);
+    }
+    contact_forces(M, phase);
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!is_rigid(fl, s) || M->closed[s]) continue;
+        Course at = output_now(fl, s, M->w, phase);
+        double depth = at.value - stop_of(fl, s)->gap;
+        bool shut = depth >= -roundings * output_noise(fl, s, M->w);
+        M->closed[s] = shut && at.first < 0.0 && is_low(M, s, -at.first, M->s->pushes[s]);
+    }
+}
+
+/* Close the rigid stops on which the body rests now and open the others. A gap and a rate of so
+ * many `roundings` are none. Resting is what is shut, does not part and is pushed on, together
+ * with all that does: stops that would have to pull are left out one by one. */
+static void settle(Motion *M, int first, double phase, double t, const double *shift,
+                   double roundings, const bool *struck)
+{
+    const Flow *fl = M->fl;
+    close_shut(M, first, phase, roundings, struck);
+    for (int round = 0; round < fl->n_stops; round++) {
+        contact_forces(M, phase);
+        const double *forces = M->s->stop_forces;
+        int weakest = -1;
+        for (int s = 0; s < fl->n_stops; s++) {
+            bool pulls = M->closed[s] && is_rigid(fl, s) && forces[s] <= 0.0;
+            if (pulls && (weakest < 0 || forces[s] < forces[weakest])) weakest = s;
+        }
+        if (weakest < 0) break;
+        M->closed[weakest] = false;
+    }
+    hold(M, phase, t, shift);
+}
+
+/* let the instant of impacts shift with the gap of stop `moves` */
+static void shift_instant(Motion *M, int moves, double phase, double t, bool anew, double *shift)
+{
+    if (anew) contact_forces(M, phase);
+    state_rate(M);
+    move(M, -1.0, shift);
+    instant_shift(M, moves, phase, t, shift);
+    move(M, 1.0, shift);
+}
+
+/* Impacts at the instant at which rigid stop `first` is hit, a time t after the start. Of those
+ * stops the ones on which the body comes to rest are closed afterwards. `crossed` tells that the
+ * instant is that of the gap's closing, and moves with it. Impacts that end in rest count as one
+ * of `closings`.
+ *
+ * Sensitivities change by the saltation [Aizerman and Gantmacher 1958; Müller 1995]: an earlier
+ * instant, by τ, is seen with the rates before it, the jump is differentiated, and the rates after
+ * it lead back. Of several impacts each has an instant of its own, which moves with its own gap:
+ * they stay in this order. A body at rest on a stop strikes it at the very instant at which another
+ * impact drives it on. */
+static void impact(Motion *M, int first, bool crossed, double phase, double t)
+{
+    const Flow *fl = M->fl;
+    bool *struck = M->s->struck, *still = M->s->still;
+    double *shift = M->s->moved_shift, fastest = 0.0, speed;
+    for (int c = 0; c < M->n_columns; c++) shift[c] = 0.0;
+    contact_forces(M, phase);
+    double *pushes = M->s->first_pushes; /* those before the impacts */
+    for (int s = 0; s < fl->n_stops; s++) {
+        pushes[s] = M->s->pushes[s];
+        struck[s] = false;
+        still[s] = M->closed[s];
+    }
+    for (int step = 0; step < 10 * ROUNDS; step++) {
+        int hit = hit_stop(M, phase, step == 0 ? first : -1, SHUT, &speed);
+        int moves = step > 0 ? hit : first;
+        fastest = larger(fastest, speed);
+        if (step > 0 && hit >= 0 && (still[hit] || speed < SLOW * fastest)) moves = -1;
+        if (M->with_columns && crossed && moves >= 0)
+            shift_instant(M, moves, phase, t, step > 0, shift);
+        if (hit < 0) break;
+        Value restitution = restitution_at(fl, hit, speed);
+        if (step > ROUNDS || is_low(M, hit, restitution.value * speed, pushes[hit]))
+            restitution = (Value){0.0, 0.0};
+        strike(M, hit, speed, restitution, phase, t, shift);
+        struck[hit] = true;
+        still[hit] = restitution.value == 0.0;
+        leave_parting(M, phase, still);
+        M->bounces[hit]++;
+        M->closings[hit]++;
+    }
+    settle(M, first, phase, t, shift, SHUT, struck);
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!(struck[s] && M->closed[s] && M->bounces[s] > 0)) continue;
+        M->closings[s] -= M->bounces[s] - 1;
+        M->bounces[s] = 0;
+    }
+    if (!M->with_columns) return;
+    contact_forces(M, phase);
+    state_rate(M);
+    move(M, -1.0, shift);
+}
+
+/* time after which a gap that opens without speed is open by 100 roundings */
+static double departure(const Motion *M, int stop, double phase)
+{
+    const Flow *fl = M->fl;
+    double noise = 100.0 * output_noise(fl, stop, M->w), t = M->shortest;
+    for (int i = 0; i < 60; i++) {
+        Course at = output_after(fl, stop, M->w, phase, t);
+        if (at.value - stop_of(fl, stop)->gap < -noise && at.first < 0.0) return t;
+        t *= 2.0;
+        if (fl->omega * t > HIT_AGAIN) break;
+    }
+    return M->shortest;
+}
+
+/* let a body that begins at or beyond rigid stops rebound, rest or leave */
+static void begin_on_rigid_stops(Motion *M)
+{
+    double speed;
+    bool any = false;
+    for (int s = 0; s < M->fl->n_stops; s++) any = any || is_rigid(M->fl, s);
+    if (!any) return;
+    int hit = hit_stop(M, M->phase, -1, AT_START, &speed);
+    if (hit >= 0) {
+        impact(M, hit, false, M->phase, 0.0);
+        return;
+    }
+    for (int s = 0; s < M->fl->n_stops; s++) M->s->struck[s] = false;
+    for (int c = 0; c < M->n_columns; c++) M->s->moved_shift[c] = 0.0;
+    settle(M, -1, M->phase, 0.0, M->s->moved_shift, AT_START, M->s->struck);
+}
