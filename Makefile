@@ -2,13 +2,13 @@
 # models (hours; it goes on where it was interrupted), `make test` runs the tests, `make bench` measures
 # speed against error, `make hard` computes the hard cases, `make faults` tries thousands of bad
 # inputs and hundreds of kills, `make docs` builds the site of the documentation, `make slow` runs all
-# tests that are too long for `make test`.
+# tests that are too long for `make test`, `make sanitize` looks for faults of memory in the engine.
 # All set up a virtual environment in .venv first.
 PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: paper atlas test slow check bench hard faults docs clean
+.PHONY: paper atlas test slow check bench hard faults sanitize docs clean
 
 $(VENV)/.installed: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -45,6 +45,15 @@ hard: $(VENV)/.installed
 # what no input and no machine may do to a run: docs/explanation/faults.md
 faults: $(VENV)/.installed
 	$(BIN)/python -m pytest tests/faults -m "slow or not slow" -o addopts=-q
+
+# the engine with the sanitizers of addresses and of undefined behaviour: tests and random systems
+SANITIZED = NLDYN_ENGINE=results/sanitized OPENBLAS_NUM_THREADS=1 ASAN_OPTIONS=detect_leaks=0 \
+	LD_PRELOAD=$(shell $(CC) -print-file-name=libasan.so) $(BIN)/python
+sanitize: $(VENV)/.installed
+	NLDYN_ENGINE=results/sanitized $(BIN)/python compile_engine.py -O1 -g \
+		-fsanitize=address,undefined -fno-sanitize-recover=undefined
+	$(SANITIZED) tests/random_systems.py 10000
+	$(SANITIZED) -m pytest tests/nldyn/flow tests/nldyn/orbits tests/nldyn/longterm
 
 # a broken link or a public name without a docstring ends the build
 docs: $(VENV)/.installed

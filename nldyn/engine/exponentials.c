@@ -168,3 +168,11 @@ static Complex swung(Complex turn, double angle)
     double s = sin(0.5 * angle), c = cos(0.5 * angle);
     return product(turn, complex_of(-2.0 * s * s, 2.0 * s * c));
 }
+
+/* the same for the tests of their last digits */
+EXPORT void nldyn_sines(int64_t m, const double *x, double *sine, double *cosine)
+{
+    fill_sines(x, sine, cosine, (int)m);
+}
+
+EXPORT void nldyn_expm1(int64_t m, double *x) { series_expm1(x, (int)m); }

@@ -233,7 +233,8 @@ static void search_piece(Search *S, const Record *rec, int64_t n, double moved)
     bool flight = piece->kind == FLIGHT;
     if (!flight) seen = larger(seen, moved);
     double wanted = ceil(piece->h * seen * (PER_HALF_WAVE / PI));
-    S->n_samples = (int64_t)smaller(wanted, MOST_SAMPLES) + 1 + (flight ? 0 : tab->m);
+    int64_t count = wanted < MOST_SAMPLES ? (int64_t)wanted : MOST_SAMPLES; /* also of nan */
+    S->n_samples = larger_index(count, 0) + 1 + (flight ? 0 : tab->m);
     if (!flight) make_weights(S);
     for (int b = 0; flight && b < S->fl.n; b++)
         S->steps[b] = block_exponential(block_of(&S->fl, b), piece->h / (double)S->n_samples);

@@ -53,7 +53,7 @@ static double rising_time(const Flow *fl, int stop, int out, const double *w, do
     double longest = 2.0 * PI / fl->omega, noise = output_noise(fl, out, w), t = start;
     for (int i = 0; i < MOST_STEPS; i++) {
         if (t > end) return INFINITY;
-        if (i % 1024 == 1023 && interrupted(fl->watch)) return -1.0;
+        if (isnan(t) || (i % 1024 == 1023 && interrupted(fl->watch))) return -1.0;
         Course at = output_after(fl, out, w, phase, t);
         double h = at.value - stop_of(fl, stop)->gap;
         if (h >= 0.0 && at.first > 0.0) return t;

@@ -8,6 +8,7 @@ whether a signal came, whose handler's exception the call then raises.
 from __future__ import annotations
 
 import ctypes
+import os
 import struct
 import sys
 from pathlib import Path
@@ -17,12 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cython_blas
 
-FOLDER = Path(__file__).parent
+FOLDER = Path(os.environ.get("NLDYN_ENGINE", Path(__file__).parent))  # another one for sanitizers
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-NOT_BUILT = (
-    "nldyn: the engine is not built; install the package anew with 'pip install .', "
-    "or with a C compiler in $CC"
-)
+NOT_BUILT = "the engine of nldyn is not built: 'pip install .' or '-e .' does so"
 
 
 def library_name(level: str = "") -> str:

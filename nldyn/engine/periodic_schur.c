@@ -50,7 +50,7 @@ static double logarithm(Complex value, double exponent)
 
 static int power_within(double exponent, double range)
 {
-    return (int)smaller(larger(exponent, -range), range);
+    return isnan(exponent) ? 0 : (int)smaller(larger(exponent, -range), range);
 }
 
 /* divide each factor by a power of two near its largest entry; the sum of the exponents: -inf if a

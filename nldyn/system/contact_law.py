@@ -1,9 +1,11 @@
-"""Contact laws of stops: the power law, and those written by the user and compiled for kernels."""
+"""Contact laws of stops: the power law, and those that users bring."""
 
 from __future__ import annotations
 
+import ctypes
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from typing import Any
@@ -11,6 +13,7 @@ from typing import Any
 from nldyn.base.errors import SystemModelError
 
 ContactLaw = Callable[[float, float], tuple[float, float, float]]
+_C_LAW = ctypes.CFUNCTYPE(None, ctypes.c_double, ctypes.c_double, ctypes.POINTER(ctypes.c_double))
 SHALLOW = 1e-6, 1e-8  # of the penetration at which the power law gives 1 N
 TRIED, SPEED = (1e-3, 0.1, 1.0), 0.1  # penetrations over their unit, and m/s, at which it is tried
 DIGITS = 1e-14  # relative rounding of a law
@@ -31,7 +34,7 @@ def power_law(
 ) -> tuple[float, float, float]:
     """The law of a stop without one of its own: its force, and the force's two derivatives.
 
-    The kernels compile this very function.
+    That of the engine is in engine/law.c.
 
     Parameters
     ----------
@@ -186,20 +189,86 @@ def _values(owner: str, law: ContactLaw, delta: float, speed: float) -> tuple[fl
     return force, stiff, viscous
 
 
+@dataclass(frozen=True)
+class CompiledLaw:
+    """A law that is a function of a shared library, as compilers of C make them.
+
+    It is called as ``void law(double depth, double speed, double out[3])`` for a positive
+    penetration and fills in the force and its derivatives by both.
+
+    Parameters
+    ----------
+    library : str
+        Path of the library.
+    name : str
+        Name of the function.
+
+    Raises
+    ------
+    SystemModelError
+        If there is no such function.
+    """
+
+    library: str
+    name: str
+
+    def __post_init__(self) -> None:
+        try:
+            _ = self.address
+        except (OSError, AttributeError) as error:
+            raise SystemModelError(f"law '{self.name}': {error}") from None
+
+    @property
+    def __name__(self) -> str:
+        """That of the function."""
+        return self.name
+
+    @property
+    def address(self) -> int:
+        """Where the function is in this process."""
+        found = getattr(ctypes.CDLL(self.library), self.name)
+        return int(ctypes.cast(found, ctypes.c_void_p).value or 0)
+
+    def __call__(self, depth: float, speed: float) -> tuple[float, float, float]:
+        """Force and its derivatives by penetration and speed."""
+        out = (ctypes.c_double * 3)()
+        _C_LAW(self.address)(depth, speed, out)
+        return out[0], out[1], out[2]
+
+
 def law_address(law: ContactLaw | None) -> int:
     """Address of the compiled law ``void (double, double, double[3])``; 0 for none.
 
     Raises
     ------
     SystemModelError
-        If numba cannot compile it.
+        If numba cannot compile it, or is not there.
     """
-    return 0 if law is None else int(_compiled(law).address)
+    if law is None:
+        return 0
+    return law.address if isinstance(law, CompiledLaw) else int(_compiled(law).address)
+
+
+def numba_for(what: str) -> Any:
+    """The package numba, which compiles functions of Python; its stubs lack what is needed.
+
+    Raises
+    ------
+    SystemModelError
+        If it is not installed.
+    """
+    try:
+        return import_module("numba")
+    except ImportError:
+        raise SystemModelError(
+            f"{what} is a function of Python, which numba compiles: install it with "
+            "pip install 'nldyn[laws]'"
+        ) from None
 
 
 @cache
 def _compiled(law: ContactLaw) -> Any:
-    numba: Any = import_module("numba")  # its stubs lack what is needed here
+    numba = numba_for(f"the contact law '{law.__name__}'")
     inner = law if hasattr(law, "py_func") else numba.njit(law)
 
     def call(delta: Any, speed: Any, out: Any) -> None:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
-from typing import Any
 
 from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
-from nldyn.system.contact_law import ContactLaw
+from nldyn.system.contact_law import ContactLaw, numba_for
 from nldyn.system.stop import Stop
 from nldyn.system.values import check_sides
 
@@ -36,7 +34,8 @@ class RigidStop:
         Interface that hits the stop.
     restitution : float or callable
         Coefficient e, from 0 to 1. Or a function of the impact speed in m/s that gives e and its
-        derivative de/dv in s/m; numba must be able to compile it.
+        derivative de/dv in s/m; numba (``pip install 'nldyn[laws]'``)
+        must be able to compile it.
     gap : float
         Distance in m at rest, not negative.
     direction : {1, -1}
@@ -160,7 +159,7 @@ def _check_restitution(owner: str, restitution: Restitution, speed: float) -> No
 
 @cache
 def _as_law(restitution: Restitution) -> ContactLaw:
-    numba: Any = import_module("numba")  # its stubs lack what is needed here
+    numba = numba_for("a restitution by the speed")
     inner = restitution if hasattr(restitution, "py_func") else numba.njit(restitution)
 
     def law(delta: float, speed: float) -> tuple[float, float, float]:

@@ -242,7 +242,8 @@ class Stop:
         back. See `dissipation_for`.
     law : callable, optional
         Another law: ``law(penetration, speed)`` gives the force and its derivatives with respect
-        to both, for a positive penetration. numba must be able to compile it. It vanishes with
+        to both, for a positive penetration. numba (``pip install 'nldyn[laws]'``) must be able to
+        compile it; a function of a library of C is a `nldyn.system.CompiledLaw`. It vanishes with
         the penetration, where `stiffness` and `exponent` say how: as k δ^p. Beyond that it must be
         smooth: one with a kink is several stops with gaps of their own.
     dashpot : float

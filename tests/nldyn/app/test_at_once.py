@@ -1,4 +1,4 @@
-"""What is answered at once: the compiled kernels and the large libraries are not even loaded."""
+"""What is answered at once: the engine and the large libraries are not even loaded."""
 
 import json
 import subprocess
@@ -10,8 +10,6 @@ import pytest
 from nldyn.base.resources import example
 
 SLOW = {
-    "numba",
-    "llvmlite",
     "nldyn.engine.newton",
     "nldyn.flow.flow_map",
     "matplotlib",
@@ -43,11 +41,10 @@ def answer(*arguments):
 @pytest.mark.parametrize(
     "name", ["one_dof", "portal", "plate"], ids=["modal", "frame with tolerance", "structure"]
 )
-def test_check_compiles_nothing(name):
-    code, said, errors, slow = answer("check", example(f"{name}.toml"))
+def test_check_computes_nothing(name):
+    code, said, _, slow = answer("check", example(f"{name}.toml"))
     assert code == 0 and "no fault found" in said
     assert not slow
-    assert not [line for line in errors if "compiling" in line]
 
 
 def test_check_tells_which_modes_a_tolerance_chooses_from():

@@ -10,15 +10,12 @@ import sys
 import time
 import types
 
-import numba
 import pytest
 import tqdm.std
 
 from nldyn.app import command
 from nldyn.paper.workers import ended_at_failure
 from nldyn.runtime import progress
-from nldyn.runtime.compilation import COMPILING, Compilations, compilations
-from nldyn.runtime.kernel_cache import ensure_cache
 
 
 def stop_loading(_):
@@ -162,19 +159,12 @@ def test_a_file_gets_no_line(capsys, clock, quiet):
     assert capsys.readouterr().err == ""
 
 
-def test_what_an_earlier_run_did_and_compilations_take_no_time(clock):
+def test_what_an_earlier_run_did_takes_no_time(clock):
     line = progress.ProgressLine()
     line("1/1", 20.0, 0.5)
     clock[0] = 10.0
-    compilations.muted = True
-    compilations.begin()
-    clock[0] = 60.0
     line("1/1", 20.0, 0.75)
-    assert line.left() == pytest.approx(10.0)  # 25 % took 10 s, though a compilation lasts
-    clock[0] = 70.0
-    compilations.end()
-    compilations.muted = False
-    assert line.left() == pytest.approx(10.0)
+    assert line.left() == pytest.approx(10.0)  # 25 % took 10 s
     line("1/1", 20.0, 0.7)  # never back
     assert line.done == 0.75
 
@@ -197,32 +187,3 @@ def test_worker_processes_end_with_the_work():
         raise KeyboardInterrupt
     worker.join(10.0)
     assert not worker.is_alive()
-
-
-def test_a_compilation_is_told_once_on_stderr_and_compiled_code_is_not(capsys):
-    told = Compilations()
-    told.begin()
-    told.begin()
-    told.end()
-    told.end()
-    told.begin()
-    told.end()
-    assert capsys.readouterr().err == f"{COMPILING}\n"
-
-
-def test_only_own_kernels_are_told(monkeypatch):
-    began = []
-    monkeypatch.setattr(compilations, "begin", lambda: began.append(1))
-    monkeypatch.setattr(compilations, "end", lambda: None)
-    ensure_cache()
-    numba.njit(lambda x: 2 * x)(1)
-    assert not began
-
-    def own(x):
-        return 3 * x
-
-    own.__module__ = "nldyn.somewhere"
-    kernel = numba.njit(own)
-    kernel(1)
-    kernel(2)
-    assert len(began) == 1

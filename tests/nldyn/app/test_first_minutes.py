@@ -1,4 +1,4 @@
-"""What a new user meets first: examples to copy, kernels compiled beforehand, results kept."""
+"""What a new user meets first: examples to copy, results kept."""
 
 import os
 import subprocess
@@ -15,29 +15,6 @@ from nldyn.scene.component import build_component
 from nldyn.scene.read import load_scene
 
 ONE_DOF = example("one_dof.toml")
-
-
-NEEDED_BEYOND_WARM = """
-import sys
-from numba.core.dispatcher import Dispatcher
-from nldyn import Stop, System, Unbalance, continue_branch, solve_orbit
-from nldyn.app.warm import warm
-
-def compiled():
-    homes = [vars(module) for name, module in sys.modules.items() if name.startswith("nldyn.")]
-    kernels = {each for home in homes for each in home.values() if isinstance(each, Dispatcher)}
-    return {(each.__name__, types) for each in kernels for types in each.overloads}
-
-warm()
-before = compiled()
-assert before
-beam = System.from_modal(
-    [33.4, 209.4, 586.5], {"tip": [1.84, 1.84, 1.84]}, modal_damping=0.01,
-    stops=[Stop("tip", stiffness=1e6, gap=1e-5)], excitation=[Unbalance("tip", 1e-5)],
-)
-continue_branch(solve_orbit(beam, frequency_hz=33.0), (32.5, 34.0))
-print(*(name for name, _ in compiled() - before))
-"""
 
 
 def invoke(*arguments):
@@ -69,20 +46,6 @@ def test_new_lists_copies_and_overwrites_nothing(tmp_path, monkeypatch):
     assert "there is no example 'none'; there are bilinear" in invoke("new", "none").stderr
     for name, meant in (("two_dof", "two_dof_xi_0.001"), ("brumper", "bumper")):
         assert f"no example '{name}'; did you mean '{meant}'? There" in invoke("new", name).stderr
-
-
-def test_warm_says_where_compiled_code_is_kept():
-    result = invoke("warm", "--quiet")
-    assert result.exit_code == 0, result.stderr
-    assert result.stdout.rstrip().rpartition("kept in ")[2] not in ("", ".", result.stdout)
-
-
-def test_warm_compiles_what_a_run_of_a_beam_needs():
-    """In a process of its own: kernels that other tests have used would count as warm."""
-    told = subprocess.run(
-        [sys.executable, "-c", NEEDED_BEYOND_WARM], capture_output=True, text=True, check=True
-    )
-    assert told.stdout.split() == []
 
 
 def test_results_of_another_scene_are_not_replaced_without_a_word(tmp_path, monkeypatch):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
 import pytest
 import scipy.linalg as sla
@@ -10,10 +12,12 @@ from hypothesis import strategies as st
 from independent import exact_flight, state_map
 
 from nldyn import Damper, FlowMap, HarmonicForce, System, Unbalance
-from nldyn.flow.kernels.flights import SLOW_DECAY, series_expm1, sines
+from nldyn.engine.library import address_of, function
 from nldyn.system.linear import _growth
 
 RNG = np.random.default_rng(1)
+SIZE_AND_ARRAYS = ctypes.c_int64, *[ctypes.c_void_p] * 3
+SLOW_DECAY = 0.35  # exponent up to which the series is used
 FACTOR = RNG.standard_normal((4, 4))
 MASS = np.diag([1.0, 2.0, 0.5, 1.5]) + 0.1 * np.ones((4, 4))
 STIFFNESS = 4e4 * (FACTOR @ FACTOR.T + 0.2 * np.eye(4))
@@ -168,10 +172,11 @@ def test_segments_chained_and_apart_agree(one_dof):
 def test_sines_and_decays_of_a_panel_are_good_to_the_last_digit():
     x = np.concatenate([RNG.uniform(-1e4, 1e4, 400), np.arange(-40, 41) * np.pi / 2, [1e-300, 0.0]])
     sine, cosine = np.empty((2, x.size))
-    sines.py_func(x, sine, cosine)
+    sines = function("nldyn_sines", *SIZE_AND_ARRAYS, result=None)
+    sines(x.size, address_of(x), address_of(sine), address_of(cosine))
     assert np.abs(sine - np.sin(x)).max() < 2.3e-16  # each within one unit of its last place
     assert np.abs(cosine - np.cos(x)).max() < 2.3e-16
     small = SLOW_DECAY * np.concatenate([np.linspace(-1.0, 1.0, 401), [1e-12, -1e-300]])
-    grown = np.empty(small.size)
-    series_expm1.py_func(small, grown)
+    grown = small.copy()
+    function("nldyn_expm1", *SIZE_AND_ARRAYS[:2], result=None)(small.size, address_of(grown))
     np.testing.assert_allclose(grown, np.expm1(small), rtol=1e-15, atol=0)

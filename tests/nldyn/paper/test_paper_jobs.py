@@ -8,16 +8,12 @@ import numpy as np
 import pytest
 
 import nldyn.paper.checks
-from nldyn.branches.predictor import predicted
-from nldyn.flow.kernels.sample import local_extremes
-from nldyn.orbits.periodic_schur import product_eigenvalues
 from nldyn.paper.figures import SHOWN
 from nldyn.paper.jobs import (
     COARSE,
     JOBS,
     LOWEST_HZ,
     Follow,
-    compile_beside,
     diagrams_of,
     is_wide,
     job_named,
@@ -52,14 +48,6 @@ def test_the_figures_and_checks_ask_for_diagrams_that_are_computed():
     asked |= set(re.findall(r'partial\(_\w+, "([\w.]+)"', source))
     assert len(asked) > 5
     assert asked <= names
-
-
-def test_what_is_compiled_beside_is_what_branches_call(kernels):
-    compiled = local_extremes, predicted, product_eigenvalues
-    before = [len(kernel.signatures) for kernel in compiled]
-    compile_beside()
-    assert min(before) > 0
-    assert [len(kernel.signatures) for kernel in compiled] == before
 
 
 def test_every_start_that_a_job_names_is_kept_and_within_its_range():

@@ -1,0 +1,162 @@
+"""The engine as a guest: interruption, threads, other laws, memory that moves."""
+
+from __future__ import annotations
+
+import pickle
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from nldyn import FlowMap, HarmonicForce, Stop, System, SystemModelError, Unbalance, solve_orbit
+from nldyn.system import CompiledLaw
+
+TURN = 2.0 * np.pi
+HERTZ = """
+#include <math.h>
+void hertz(double depth, double speed, double out[3])
+{
+    out[0] = 5e8 * depth * sqrt(depth);
+    out[1] = 7.5e8 * sqrt(depth);
+    out[2] = 0.0 * speed;
+}
+"""
+
+
+def rattling(**law):
+    """Two modes between two stops."""
+    return System.from_modal(
+        [10.0, 37.0],
+        {"a": [1.0, 0.4], "b": [0.5, -0.8]},
+        modal_damping=0.02,
+        stops=[Stop("a", 5e8, **law), Stop("b", 5e8, gap=1e-5, direction=-1)],
+        excitation=[Unbalance("a", 1e-4), HarmonicForce("b", 1.0)],
+    )
+
+
+def fly(flow, omega, periods):
+    phases = TURN * np.arange(periods + 1.0)
+    return flow.shoot(np.zeros((1, 4)), phases, omega, chained=True)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signal to itself in time")
+def test_ctrl_c_ends_a_long_call_within_a_second():
+    """A hundred thousand periods in one call would take minutes."""
+    flow = FlowMap(rattling())
+    fly(flow, 80.0, 1)
+    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
+    came = []
+
+    def interrupt():
+        came.append(time.monotonic())
+        signal.raise_signal(signal.SIGINT)
+
+    timer = threading.Timer(0.2, interrupt)
+    try:
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            fly(flow, 80.0, 100_000)
+        late = time.monotonic() - came[0]
+    finally:
+        timer.cancel()
+        signal.signal(signal.SIGINT, usual)
+    assert late < 1.0
+    again = fly(flow, 80.0, 1)  # nothing is left behind
+    assert not again.failure
+
+
+def test_a_signal_may_raise_what_it_likes_in_a_long_call():
+    def late(number, frame):
+        raise TimeoutError("late")
+
+    flow = FlowMap(rattling())
+    usual = signal.signal(signal.SIGINT, late)
+    timer = threading.Timer(0.2, signal.raise_signal, [signal.SIGINT])
+    try:
+        timer.start()
+        with pytest.raises(TimeoutError, match="late"):
+            fly(flow, 80.0, 100_000)
+    finally:
+        timer.cancel()
+        signal.signal(signal.SIGINT, usual)
+
+
+def test_two_threads_at_once_give_the_bits_of_one_after_the_other():
+    flow, speeds = FlowMap(rattling()), (70.0, 95.0)
+    alone = [fly(flow, omega, 40) for omega in speeds]
+    beside = {}
+
+    def work(omega):
+        beside[omega] = fly(flow, omega, 40)
+
+    threads = [threading.Thread(target=work, args=(omega,)) for omega in speeds]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for omega, found in zip(speeds, alone, strict=True):
+        assert np.array_equal(beside[omega].ends, found.ends)
+        assert np.array_equal(beside[omega].jacobians, found.jacobians)
+
+
+def test_other_threads_run_during_a_call():
+    flow, count, done = FlowMap(rattling()), [0], threading.Event()
+
+    def counting():
+        while not done.is_set():
+            count[0] += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=counting)
+    thread.start()
+    before = count[0]
+    fly(flow, 80.0, 400)
+    seen = count[0] - before
+    done.set()
+    thread.join()
+    assert seen > 3
+
+
+def test_a_motion_that_was_pickled_has_its_numbers_elsewhere():
+    flow = FlowMap(rattling())
+    motion = flow.trajectory(np.zeros((1, 4)), TURN * np.arange(4.0), 80.0, chained=True)
+    phases = np.linspace(0.0, 6.0 * np.pi, 50)
+    states, extremes = motion.states(phases), motion.extremes(0)
+    content = pickle.dumps(motion)
+    del motion
+    other = pickle.loads(content)
+    assert np.array_equal(other.states(phases), states)
+    assert np.array_equal(other.extremes(0), extremes)
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    """A library of laws."""
+    compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    if compiler is None:
+        pytest.skip("there is no compiler")
+    folder = tmp_path_factory.mktemp("laws")
+    (folder / "laws.c").write_text(HERTZ)
+    path = str(folder / "laws.so")
+    command = [compiler, "-O2", "-shared", "-fPIC", "laws.c", "-o", path, "-lm"]
+    subprocess.run(command, cwd=folder, check=True)
+    return path
+
+
+def test_a_law_of_c_gives_the_orbits_of_the_same_law_here(library):
+    law = CompiledLaw(library, "hertz")
+    own, usual = (solve_orbit(rattling(**given), 12.0) for given in ({"law": law}, {}))
+    np.testing.assert_allclose(own.multipliers, usual.multipliers, rtol=1e-9, atol=1e-12)
+    assert pickle.loads(pickle.dumps(law)) == law
+
+
+def test_a_law_that_is_not_there_is_told(library):
+    with pytest.raises(SystemModelError, match="law 'hook': .*hook"):
+        CompiledLaw(library, "hook")
+    with pytest.raises(SystemModelError, match="law 'hertz': .*nowhere"):
+        CompiledLaw("nowhere.so", "hertz")
