@@ -1,4 +1,4 @@
-"""A system's numbers as the compiled flow takes them."""
+"""A system's numbers as the engine takes them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _EXCITATION = -1
 def stop_row(
     stop: AnyStop, mobility: float, options: FlowOptions, releases: Iterator[float]
 ) -> StopRow:
-    """Numbers of a stop as the kernels take them, with its mobility in 1/kg.
+    """Numbers of a stop as the engine takes them, with its mobility in 1/kg.
 
     `releases` are the outputs that tell when stops let go that never pull.
     """
@@ -53,14 +53,14 @@ def stop_row(
 
 
 def bond_row(bond: Bond, mobility: float) -> StopRow:
-    """Numbers of a bond as the kernels take them, but for the coefficients of its powers."""
+    """Numbers of a bond as the engine takes them, but for the coefficients of its powers."""
     return _NO_STOP._replace(mobility=mobility, bond=1.0, drag=bond.drag, cubic=bond.cubic)
 
 
 def parameter_tables(
     system: System, parameters: Sequence[Parameter]
 ) -> tuple[NDArray[np.int64], Complex]:
-    """What the kernels need to know of parameters: see `kernels.segments.shoot`.
+    """What the engine needs to know of parameters: see `engine.newton.newton`.
 
     Raises
     ------

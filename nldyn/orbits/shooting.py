@@ -111,7 +111,7 @@ class ShootingProblem:
         A row (N + 1,) that is zero but for its last entry holds the frequency. A first step farther
         than `longest` (relative, as in `metric`) from `aim`, the guess by default, means failure.
         The contacts of a motion `like` the one sought, if one is known, are where those are looked
-        for first. See `kernels.newton.Corrector` for the other arguments.
+        for first. See `engine.newton.Corrector` for the other arguments.
         """
         level = float(row @ guess) if offset is None else offset
         row = np.ascontiguousarray(row, dtype=float)

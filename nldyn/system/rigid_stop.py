@@ -84,7 +84,7 @@ class RigidStop:
 
     @property
     def law(self) -> ContactLaw | None:
-        """The restitution as kernels call a law, where it is a function of the speed."""
+        """The restitution as the engine calls a law, where it is a function of the speed."""
         return _as_law(self.restitution) if callable(self.restitution) else None
 
     @property

@@ -13,7 +13,7 @@ from nldyn.base.version import software_version
 from nldyn.report.results import write_table
 
 Row = Mapping[str, str]
-PACKAGES = ("numpy", "scipy", "numba", "heyoka", "scikit-sundae")
+PACKAGES = ("numpy", "scipy", "heyoka", "scikit-sundae")
 
 NOTES = {
     "Targets": "The verdicts are computed from the tables below.",

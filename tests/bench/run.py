@@ -44,7 +44,7 @@ def run(folder: Path, models: Sequence[str] = MODELS, *, first_call: bool = True
     models : sequence of str
         Some of `MODELS`.
     first_call : bool
-        Whether to time the first call, which compiles everything anew.
+        Whether to time the first call of a process.
 
     Returns
     -------

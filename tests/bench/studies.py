@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import cProfile
 import math
-import os
 import pstats
 import re
 import statistics
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -388,28 +386,18 @@ print(imported, time.process_time())
 
 @dataclass(frozen=True)
 class FirstCall:
-    """Seconds of the import alone, and of import and first orbit, by state of the cache."""
+    """Seconds of the import alone, and of import and first orbit."""
 
-    cold_import: float
-    cold_orbit: float
-    warm_import: float
-    warm_orbit: float
+    import_alone: float
+    orbit: float
 
 
 def first_call() -> FirstCall:
-    """Import and first orbit in new processes: compile cache empty, then filled."""
-    with tempfile.TemporaryDirectory() as folder:
-        times = []
-        for _ in range(2):
-            text = subprocess.run(
-                [sys.executable, "-c", FIRST_ORBIT],
-                env={**os.environ, "NUMBA_CACHE_DIR": folder},
-                capture_output=True,
-                text=True,
-                check=True,
-            ).stdout
-            times += [float(word) for word in text.split()]
-    return FirstCall(*times)
+    """Import and first orbit in a new process."""
+    text = subprocess.run(
+        [sys.executable, "-c", FIRST_ORBIT], capture_output=True, text=True, check=True
+    ).stdout
+    return FirstCall(*(float(word) for word in text.split()))
 
 
 # Against AUTO's special points

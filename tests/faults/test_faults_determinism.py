@@ -31,7 +31,7 @@ def test_two_processes_give_the_same_bytes(tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text(text.replace("max_step = 0.02", "max_step = 0.1"))
     for seed in ("1", "2"):
-        threads = {f"{name}_NUM_THREADS": seed for name in ("OPENBLAS", "OMP", "NUMBA")}
+        threads = {f"{name}_NUM_THREADS": seed for name in ("OPENBLAS", "OMP")}
         subprocess.run(
             [sys.executable, "-c", START, "run", str(scene), "--out", str(tmp_path / seed),
              "--jobs", "1"],

@@ -1,9 +1,8 @@
-"""The command from its first moment: Ctrl-C while loading, the kernels' folder, progress."""
+"""The command from its first moment: Ctrl-C while loading, progress."""
 
 import io
 import math
 import multiprocessing
-import os
 import re
 import subprocess
 import sys
@@ -57,21 +56,6 @@ def test_other_errors_of_loading_are_not_hidden(monkeypatch):
     monkeypatch.setitem(sys.modules, "nldyn.app.cli", broken)
     with pytest.raises(ZeroDivisionError):
         command.main()
-
-
-def test_no_folder_for_compiled_code():
-    """Without one, a temporary folder serves, one line says so, and nothing is left of it."""
-    environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
-    environment["NUMBA_CACHE_LOCATOR_CLASSES"] = "UserProvidedCacheLocator"
-    code = (
-        "import nldyn.flow.flow_map, os; f = os.environ['NUMBA_CACHE_DIR']; print(f, os.listdir(f))"
-    )
-    run = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
-    )
-    folder, _, content = run.stdout.strip().partition(" ")
-    assert content != "[]" and not os.path.exists(folder)
-    assert run.stderr.count("\n") == 1 and "NUMBA_CACHE_DIR" in run.stderr
 
 
 class Terminal(io.StringIO):

@@ -199,7 +199,7 @@ def test_senseless_segments_are_refused(nodes, phases, omega, says):
 
 @pytest.mark.parametrize(("guess", "row"), [(3, 5), (5, 3), (6, 6)])
 def test_unknowns_that_do_not_fit_the_segments_are_refused(guess, row):
-    """Two segments of one mode have five; the compiled kernel does not look where they end."""
+    """Two segments of one mode have five; the engine does not look where they end."""
     with pytest.raises(SystemModelError, match=r"guess and row must have shape \(5,\)"):
         problem = ShootingProblem(FlowMap(one_dof(0.0)), 1, 2)
         problem.correct(np.zeros(guess), np.zeros(row), offset=0.0)

@@ -153,7 +153,7 @@ def wrapped_interrupt(value):
     try:
         raise KeyboardInterrupt
     except KeyboardInterrupt as error:
-        raise SystemError("a kernel returned a result with an exception set") from error
+        raise SystemError("a library returned a result with an exception set") from error
 
 
 def test_ctrl_c_is_no_failure_of_a_case():
@@ -163,9 +163,9 @@ def test_ctrl_c_is_no_failure_of_a_case():
         run_all(wrapped_interrupt, [1, 2], pool)
 
 
-def test_ctrl_c_in_a_compiled_kernel_ends_all_cases():
+def test_ctrl_c_in_the_engine_ends_all_cases():
     flow = FlowMap(make_one_dof())
-    simulate(flow, 36.0, 1)  # compiled before the signal comes
+    simulate(flow, 36.0, 1)
     begun = []
 
     def case(index):
@@ -187,10 +187,10 @@ def test_ctrl_c_in_a_compiled_kernel_ends_all_cases():
     assert begun == [0]
 
 
-def test_what_an_alarm_raises_comes_out_of_a_compiled_kernel_as_it_is():
-    """A time limit, say; compiled code tells of a SystemError."""
+def test_what_an_alarm_raises_comes_out_of_the_engine_as_it_is():
+    """A time limit, say."""
     flow = FlowMap(make_one_dof())
-    simulate(flow, 36.0, 1)  # compiled before the signal comes
+    simulate(flow, 36.0, 1)
 
     def too_late(number, frame):
         raise TimeoutError("too late")
@@ -205,10 +205,10 @@ def test_what_an_alarm_raises_comes_out_of_a_compiled_kernel_as_it_is():
         signal.signal(signal.SIGALRM, before)
 
 
-def test_a_kernel_lets_other_threads_go_on():
+def test_the_engine_lets_other_threads_go_on():
     """With the interpreter's lock held there would be two or three turns, however long the call."""
     flow = FlowMap(make_one_dof())
-    start = flow.to_state(simulate(flow, 36.0, 1).end)[None]  # compiled before
+    start = flow.to_state(simulate(flow, 36.0, 1).end)[None]
     with ThreadPoolExecutor(1) as pool:
         for doublings in range(8):  # until the call is long enough, whatever the machine
             phases = 2.0 * np.pi * np.arange(2000 * 2**doublings + 1)
