@@ -76,13 +76,13 @@ class Packed:
 
 def _capsule(name: str) -> int:
     """Address of a function of BLAS, as scipy hands it to compiled code."""
-    capsule = cython_blas.__pyx_capi__[name]
+    functions: dict[str, Any] = vars(cython_blas)["__pyx_capi__"]
     api = ctypes.pythonapi
     api.PyCapsule_GetName.restype = ctypes.c_char_p
     api.PyCapsule_GetName.argtypes = [ctypes.py_object]
     api.PyCapsule_GetPointer.restype = ctypes.c_void_p
     api.PyCapsule_GetPointer.argtypes = [ctypes.py_object, ctypes.c_char_p]
-    return int(api.PyCapsule_GetPointer(capsule, api.PyCapsule_GetName(capsule)))
+    return int(api.PyCapsule_GetPointer(functions[name], api.PyCapsule_GetName(functions[name])))
 
 
 def _function(name: str) -> int:

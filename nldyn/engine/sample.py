@@ -6,7 +6,7 @@ import ctypes
 
 import numpy as np
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import Complex, Real
 from nldyn.engine.layout import OUT_OF_MEMORY
 from nldyn.engine.library import HOST, Packed, address_of, function
 from nldyn.engine.numbers import complexes, reals
@@ -41,7 +41,7 @@ def local_extremes(
     record: Packed,
     omega: float,
     orders: Real,
-    amplitudes: Real,
+    amplitudes: Complex,
     output: int,
 ) -> Real:
     """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output, (k, 3).
