@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import pickle
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from nldyn import FlowMap, HarmonicForce, Stop, System, SystemModelError, Unbalance, solve_orbit
-from nldyn.system import CompiledLaw
+from nldyn.engine import layout, library
+from nldyn.system import CompiledLaw, linear
+from nldyn.system.contact_law import power_law
 
 TURN = 2.0 * np.pi
 HERTZ = """
@@ -26,6 +30,36 @@ void hertz(double depth, double speed, double out[3])
     out[2] = 0.0 * speed;
 }
 """
+
+
+def written(file, pattern):
+    """The names or the number that a source of the engine has in some place."""
+    text = (Path(library.__file__).parent / file).read_text("utf-8")
+    return re.search(pattern, text, re.S)[1]
+
+
+def test_what_python_and_c_share_is_the_same():
+    outcomes = re.findall(r"\w+", written("engine.h", r"enum Status \{(.*?)\}"))
+    assert [getattr(layout, name) for name in outcomes] == list(range(len(outcomes)))
+    columns = re.findall(r"\w+", written("engine.h", r"enum Column \{(.*?)\}"))
+    assert columns == [*map(str.upper, layout.StopRow._fields), "FIRST_POWER"]
+    assert float(written("engine.h", r"#define ROUND (\S+)")) == layout.ROUND
+    assert float(written("response.c", r"#define NEAR (\S+)")) == linear.NEAR
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.2])
+def test_the_law_of_a_stop_is_the_same_in_python_and_in_c(exponent):
+    """A still body on a stop, let go: the rate of its speed is the force over its mass."""
+    stop = Stop("x", 1e5, exponent, dissipation=0.3)
+    system = System.from_matrices([[2.0]], [[0.0]], {"x": [1.0]}, stops=[stop])
+    flow, omega, depth, speed = FlowMap(system), 2e4, 3e-3, 0.02
+    mode = system.participation["x"][0]
+    modal = np.array([[depth, speed]]) / mode
+    start = flow.to_state(modal)
+    found = flow.shoot(start, np.array([0.0, 1e-3]), omega)
+    change = (flow.to_modal(found.ends) - modal)[0] / (1e-3 / omega)
+    force, _, _ = power_law(1e5, exponent, 0.3, 0.0, depth, speed)
+    assert change[1] == pytest.approx(-force * mode, rel=1e-4)
 
 
 def rattling(**law):
@@ -101,7 +135,7 @@ def test_a_motion_that_was_pickled_has_its_numbers_elsewhere():
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory):
+def laws(tmp_path_factory):
     """A library of laws."""
     compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
     if compiler is None:
@@ -114,15 +148,15 @@ def library(tmp_path_factory):
     return path
 
 
-def test_a_law_of_c_gives_the_orbits_of_the_same_law_here(library):
-    law = CompiledLaw(library, "hertz")
+def test_a_law_of_c_gives_the_orbits_of_the_same_law_here(laws):
+    law = CompiledLaw(laws, "hertz")
     own, usual = (solve_orbit(rattling(**given), 12.0) for given in ({"law": law}, {}))
     np.testing.assert_allclose(own.multipliers, usual.multipliers, rtol=1e-9, atol=1e-12)
     assert pickle.loads(pickle.dumps(law)) == law
 
 
-def test_a_law_that_is_not_there_is_told(library):
+def test_a_law_that_is_not_there_is_told(laws):
     with pytest.raises(SystemModelError, match=r"law 'hook': .*hook"):
-        CompiledLaw(library, "hook")
+        CompiledLaw(laws, "hook")
     with pytest.raises(SystemModelError, match=r"law 'hertz': .*nowhere"):
         CompiledLaw("nowhere.so", "hertz")

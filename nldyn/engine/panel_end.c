@@ -1,0 +1,160 @@
+/* What a panel leads to: the state at its end, its sensitivities, outputs at its nodes. */
+#include "engine.h"
+
+/* add to w (2n,) what impulses (na,) in the sense of the gaps change */
+static void add_kicks(const Flow *fl, const Panel *panel, const double *kicks, double *w)
+{
+    for (int a = 0; a < panel->na; a++) {
+        const double *push = push_of(fl, panel->active[a]);
+        for (int k = 0; k < fl->size; k++) w[k] += push[k] * kicks[a];
+    }
+}
+
+/* fill and factor the matrix 1 + h viscosity mobility of the closed stops */
+static void factor_holding(const Flow *fl, double h, const Panel *panel, Scratch *s)
+{
+    int na = panel->na;
+    for (int a = 0; a < na; a++)
+        for (int b = 0; b < na; b++) {
+            double mobility = between(fl, panel->active[a], panel->active[b]);
+            s->hold_matrix[a * na + b] = (a == b) + h * s->viscosity[a] * mobility;
+        }
+    lu_factor(s->hold_matrix, na, s->hold_order);
+}
+
+/* Correct the end of a panel by the speeds of the stops that damp strongly.
+ *
+ * An error of such a force is a much smaller one of the speed, by its slope. So the nodes' speeds,
+ * and the one at which the law gives the force of the end, are known better than what the forces
+ * integrate to. Where several stops damp, they count by how strongly they do. */
+static void hold_speeds(const Flow *fl, const Gauss *tab, int kind, double end_phase, double h,
+                        Panel *panel, double *w_end, Scratch *s)
+{
+    int na = panel->na, m = panel->m;
+    if (largest(panel->decay, na) <= DECAY) return;
+    for (int a = 0; a < na; a++) {
+        s->viscosity[a] = s->off[a] = 0.0;
+        if (!(panel->decay[a] > DECAY)) continue;
+        double speed = output_now(fl, panel->active[a], w_end, end_phase).first, gained = 0.0;
+        s->viscosity[a] = law(fl, panel->active[a], panel->end_depth[a], speed).viscosity;
+        for (int i = 0; i < m; i++)
+            gained += h * tab->weights[kind * m + i] * panel->output[(na + a) * m + i];
+        s->off[a] = h * s->viscosity[a] * (panel->depth[a] + gained - panel->end_depth[a]);
+    }
+    factor_holding(fl, h, panel, s);
+    lu_apply_vector(s->hold_matrix, na, s->hold_order, s->off);
+    for (int k = 0; k < fl->size; k++) s->kick[k] = s->shift[k] = 0.0;
+    add_kicks(fl, panel, s->off, s->kick);
+    add_rates(fl->blocks, fl->n, s->kick, s->shift); /* without the end of a kick in time */
+    for (int k = 0; k < fl->size; k++) {
+        w_end[k] += s->shift[k];
+        for (int a = 0; a < na; a++)
+            panel->end_depth[a] += row_of(fl, 0, panel->active[a])[k] * s->shift[k];
+    }
+    for (int round = 0; round < 2; round++) { /* the slopes are those before the shift */
+        for (int a = 0; a < na; a++) {
+            s->off[a] = 0.0;
+            if (!(s->viscosity[a] > 0.0)) continue;
+            double speed = output_now(fl, panel->active[a], w_end, end_phase).first;
+            double force = law(fl, panel->active[a], panel->end_depth[a], speed).force;
+            s->off[a] = h * (at_end(tab, panel->F + (size_t)a * m) - force);
+        }
+        lu_apply_vector(s->hold_matrix, na, s->hold_order, s->off);
+        add_kicks(fl, panel, s->off, w_end);
+    }
+}
+
+/* state w_end and penetrations at the end of a panel from the forces at its nodes; `decay` has
+ * been filled */
+static void panel_end(const Flow *fl, const Gauss *tab, int kind, double phase, const double *w,
+                      double h, Panel *panel, double *w_end, Scratch *s)
+{
+    int na = panel->na, m = panel->m;
+    for (int a = 0; a < na; a++) panel->end_depth[a] = panel->depth[a];
+    for (int k = 0; k < fl->size; k++) {
+        double kick = 0.0; /* what the forces have added, taken back to the start */
+        for (int a = 0; a < na; a++) {
+            const double *back = panel->back + ((size_t)a * fl->size + k) * m;
+            for (int j = 0; j < m; j++)
+                kick -= h * tab->weights[kind * m + j] * panel->F[a * m + j] * back[j];
+        }
+        w_end[k] = w[k] + kick;
+        for (int a = 0; a < na; a++)
+            panel->end_depth[a] += row_of(fl, 0, panel->active[a])[k] * kick;
+    }
+    for (int a = 0; a < na; a++)
+        panel->end_depth[a] += flown(fl, panel->active[a], phase, w_end, h);
+    fly_state(fl->blocks, fl->n, w_end, h);
+    hold_speeds(fl, tab, kind, phase + fl->omega * h, h, panel, w_end, s);
+}
+
+/* add to the forces' sensitivities at the node of output o what the excitation and the stop's own
+ * parameters do */
+static void add_node_columns(const Flow *fl, double node_phase, double t, const Panel *panel,
+                             int o, int i, int n_columns, double *forces)
+{
+    int na = panel->na, m = panel->m, stop = panel->active[o % na];
+    int order = output_order(fl, stop, o / na);
+    add_forced_by(fl, stop, order, node_phase, t, panel->slope[o * m + i], forces, n_columns);
+    for (int c = 0; c < fl->n_parameters && order == 0; c++) {
+        int64_t column = fl->parameters[2 * c];
+        if (fl->parameters[2 * c + 1] != stop || column < GAP) continue;
+        double speed = panel->outputs > na ? panel->output[(na + o) * m + i] : 0.0;
+        forces[fl->size + c] += law_by(fl, stop, column, panel->output[o * m + i], speed);
+    }
+}
+
+/* Advance sensitivities (2n, n_columns) in place over a panel.
+ *
+ * After those of the start come the derivatives with respect to parameters; the last column is
+ * that with respect to ω at fixed time; t0 is the time from the start of the segment at which its
+ * phase is fixed. */
+static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double phase, double t0,
+                          double h, Panel *panel, double *columns, int n_columns, Scratch *s)
+{
+    int na = panel->na, m = panel->m, width = na * m;
+    memset(s->forces, 0, sizeof(double) * width * n_columns);
+    for (int o = 0; o < panel->outputs; o++) {
+        multiply(fl->watch, panel->to + (size_t)o * m * fl->size, columns, s->part, m, fl->size,
+                 n_columns);
+        for (int i = 0; i < m; i++) {
+            double *forces = s->forces + (size_t)((o % na) * m + i) * n_columns;
+            double slope = panel->slope[o * m + i], t = h * tab->chi[kind * m + i];
+            for (int c = 0; c < n_columns; c++) forces[c] += slope * s->part[i * n_columns + c];
+            add_node_columns(fl, phase + fl->omega * t, t0 + t, panel, o, i, n_columns, forces);
+        }
+    }
+    factor_panel(panel);
+    lu_apply(panel->factors, width, panel->order, s->forces, n_columns);
+    for (int a = 0; a < na; a++) {
+        for (int j = 0; j < m; j++)
+            for (int c = 0; c < n_columns; c++)
+                s->part[j * n_columns + c] =
+                    h * tab->weights[kind * m + j] * s->forces[(size_t)(a * m + j) * n_columns + c];
+        multiply(fl->watch, panel->back + (size_t)a * fl->size * m, s->part, s->change, fl->size,
+                 m, n_columns);
+        for (int k = 0; k < fl->size * n_columns; k++) columns[k] -= s->change[k];
+    }
+    fly_columns(fl->blocks, fl->n, columns, n_columns, h);
+}
+
+/* fill an output at the nodes of a panel, (m,), with the forces at work */
+static void node_outputs(const Flow *fl, const Gauss *tab, int kind, double phase, const double *w,
+                         double h, const Panel *panel, int out, double *values, Scratch *s)
+{
+    int m = panel->m;
+    const double *integrate = tab->integrate + (size_t)kind * m * m;
+    for (int i = 0; i < m; i++) {
+        double t = h * tab->chi[kind * m + i];
+        for (int k = 0; k < fl->size; k++) {
+            s->driven[k] = w[k];
+            for (int a = 0; a < panel->na; a++) {
+                const double *back = panel->back + ((size_t)a * fl->size + k) * m;
+                for (int j = 0; j < m; j++)
+                    s->driven[k] -= h * integrate[i * m + j] * panel->F[a * m + j] * back[j];
+            }
+        }
+        values[i] = free_output(fl, out, s->driven, t) +
+                    forced_output(fl, out, phase + fl->omega * t);
+    }
+}
