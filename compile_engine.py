@@ -23,7 +23,9 @@ FLAGS = [
     "-std=c11", "-O3", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-math-errno",
     "-fno-trapping-math", "-ffp-contract=off",
 ]  # fmt: skip
-WIDER = "-march=x86-64-v3"  # a second form, for processors of the last ten years
+# the forms of the library, for all processors and, on x86-64, for those of the last ten years
+LEVELS = {"": [], "v3": ["-march=x86-64-v3"]}
+LEVELS_OF_ZIG = {"": ["-mcpu=baseline"], "v3": ["-mcpu=x86_64_v3"]}  # else for this processor
 COMPILERS = "cc", "gcc", "clang"
 HELP = "install gcc or clang, or 'pip install ziglang', or set $CC to a C compiler"
 
@@ -50,9 +52,10 @@ def compile_engine(folder: Path = ENGINE, flags: Sequence[str] = ()) -> list[Pat
     if command is None:
         raise SystemExit(f"nldyn: there is no C compiler for the engine: {HELP}")
     machine = sysconfig.get_platform().rsplit("-")[-1].lower()
-    levels = {"": []} | ({"v3": [WIDER]} if machine in ("x86_64", "amd64") else {})
     found = []
-    for level, more in levels.items():
+    for level, more in (LEVELS_OF_ZIG if "ziglang" in command else LEVELS).items():
+        if level and machine not in ("x86_64", "amd64"):
+            continue
         target = folder / f"engine{level}{SUFFIX}"
         fresh = target.with_suffix(".new")
         last = ["-o", str(fresh), *([] if sys.platform == "win32" else ["-lm"])]

@@ -29,13 +29,14 @@ def library_name(level: str = "") -> str:
 
 
 def _load() -> ctypes.PyDLL:
-    """The library's best form for this processor."""
+    """The library's best form for this processor; $NLDYN_PROCESSOR=baseline asks for the first."""
     base = FOLDER / library_name()
     if not base.exists():
         raise ImportError(f"{NOT_BUILT} (no {base})")
     library = ctypes.PyDLL(str(base))
     wider = FOLDER / library_name("v3")
-    if wider.exists() and library.nldyn_runs_v3():
+    baseline = os.environ.get("NLDYN_PROCESSOR") == "baseline"
+    if wider.exists() and library.nldyn_runs_v3() and not baseline:
         return ctypes.PyDLL(str(wider))
     return library
 
