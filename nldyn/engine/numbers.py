@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -23,8 +21,3 @@ def complexes(values: ArrayLike) -> Complex:
 def flags(values: ArrayLike) -> NDArray[np.bool_]:
     """Truth values, a byte each."""
     return np.ascontiguousarray(values, dtype=np.bool_)
-
-
-def wholes(values: ArrayLike) -> NDArray[Any]:
-    """Whole numbers of eight bytes."""
-    return np.ascontiguousarray(values, dtype=np.int64)
