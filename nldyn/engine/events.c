@@ -76,13 +76,15 @@ static double coarsest_instant(const Flow *fl)
     return found;
 }
 
-/* whether a stop is just about to switch, to within a time allowed or rounding */
+/* whether a stop is just about to switch, to within a time allowed or rounding: of the state, and of
+ * the time, since an instant is known no better than its phase */
 static bool at_switch(const Flow *fl, int stop, const double *w, double phase, double allowed,
                       const bool *closed)
 {
     Course at = watched_pace(fl, stop, closed, w, phase);
     int out = watched(fl, stop, closed, w, phase);
-    return fabs(at.value) <= allowed * fabs(at.first) + 10.0 * output_noise(fl, out, w);
+    double instant = allowed + 10.0 * SUM_ROUNDING * phase / fl->omega;
+    return fabs(at.value) <= instant * fabs(at.first) + 10.0 * output_noise(fl, out, w);
 }
 
 /* whether a stop is to open or close now, to within a time allowed or rounding; a rigid one does
@@ -120,7 +122,8 @@ static int stop_at_switch(const Flow *fl, const double *w, double phase, double 
                           const bool *closed)
 {
     int stop = -1;
-    double nearest = INFINITY, allowed = 10.0 * coarsest_instant(fl) * h;
+    double nearest = INFINITY;
+    double allowed = 10.0 * (coarsest_instant(fl) * h + SUM_ROUNDING * phase / fl->omega);
     for (int s = 0; s < fl->n_stops; s++) {
         if (is_bond(fl, s) || (is_rigid(fl, s) && closed[s])) continue;
         double late = fabs(time_to_event(fl, s, closed, w, phase));
