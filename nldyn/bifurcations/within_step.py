@@ -277,8 +277,8 @@ def hidden_dips(z: BranchNode, a: BranchNode, b: BranchNode) -> tuple[float, ...
     full = 2.0 * math.pi * a.orbit.period
     for output in range(len(a.orbit.system.stops)):
         beside = (point.orbit.touches(output) for point in (z, a, b))
-        columns = [x for e in beside for x in (e.phases, e.values, e.is_maximum)]
-        found.append(extreme_dip(left, right, *columns, full))
+        first, middle, last = [(e.phases, e.values, e.is_maximum) for e in beside]
+        found.append(extreme_dip(left, right, first, middle, last, full))
     return tuple(a.arclength + way for way in found)
 
 

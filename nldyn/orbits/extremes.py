@@ -12,6 +12,7 @@ from nldyn.engine.library import Packed, address_of, function
 from nldyn.engine.numbers import flags, reals
 
 Kinds = NDArray[np.bool_]
+Extremes = tuple[Real, Real, Kinds]
 _WHOLE, _NUMBER, _POINTER, _EXTREMES = (
     ctypes.c_int64, ctypes.c_double, ctypes.c_void_p, ctypes.c_char_p
 )  # fmt: skip
@@ -66,10 +67,11 @@ def dip(left: float, right: float, before: float, here: float, after: float) -> 
 
 
 def extreme_dip(
-    left: float, right: float, phases_z: Real, values_z: Real, kinds_z: Kinds, phases: Real,
-    values: Real, kinds: Kinds, phases_b: Real, values_b: Real, kinds_b: Kinds, full: float,
-) -> float:  # fmt: skip
-    """The same for the first of the extremes that does so, each with the nearest ones beside it."""
-    before, here = _packed(phases_z, values_z, kinds_z), _packed(phases, values, kinds)
-    after = _packed(phases_b, values_b, kinds_b)
-    return float(_extreme_dip(left, right, before.content, here.content, after.content, full))
+    left: float, right: float, before: Extremes, here: Extremes, after: Extremes, full: float
+) -> float:
+    """The same for the first of the extremes that does so, each with the nearest ones beside it.
+
+    Extremes are their phases, values, and whether they are maxima.
+    """
+    z, a, b = (_packed(*each) for each in (before, here, after))
+    return float(_extreme_dip(left, right, z.content, a.content, b.content, full))
