@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cython_blas
 
-FOLDER = Path(os.environ.get("NLDYN_ENGINE", Path(__file__).parent))  # another one for sanitizers
+FOLDER = Path(os.environ.get("NLDYN_ENGINE", Path(__file__).parent)).resolve()  # of sanitizers
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 NOT_BUILT = "the engine of nldyn is not built: 'pip install .' or '-e .' does so"
 
