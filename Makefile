@@ -10,7 +10,7 @@ BIN = $(VENV)/bin
 
 .PHONY: paper atlas test slow check bench hard faults sanitize docs clean
 
-$(VENV)/.installed: pyproject.toml
+$(VENV)/.installed: pyproject.toml compile_engine.py $(wildcard nldyn/engine/*.[ch])
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[dev]"
 	touch $@

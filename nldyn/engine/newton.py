@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import struct
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from nldyn.engine.layout import OUT_OF_MEMORY, Record, SystemData
 from nldyn.engine.library import HOST, Packed, address_of, function
 from nldyn.engine.numbers import reals
 
+WIDTH = 8  # numbers in the widest register
 _TASK = struct.Struct("8q6d13q")  # the structure Task of newton.c
 _newton = function("nldyn_newton", *[ctypes.c_char_p] * 5)
 
@@ -144,28 +146,25 @@ def newton(
     k, n, count = phases.size - 1, point.size, len(parameters)
     kept = k if with_columns else 1
     jacobians, closings = np.empty((kept, size, size)), np.empty(n_stops, dtype=np.int64)
-    lengths = 3, n, k * size, kept * size, kept * size * count
-    numbers = np.zeros(sum(lengths))
-    told = address_of(numbers)
-    along = told + 24
-    ends = along + 8 * n
-    d_omegas = ends + 8 * k * size
+    sizes = 3, n, k * size, kept * size, kept * size * count
+    # each begins where a vector register may: sums of BLAS depend on it
+    starts = [0, *accumulate(-(-each // WIDTH) * WIDTH for each in sizes)]
+    numbers = np.zeros(starts[-1])
+    first_place = address_of(numbers)
+    told, along, ends, d_omegas, by = (first_place + 8 * start for start in starts[:-1])
     task = _TASK.pack(
         recording, chained, with_columns, k, n, count, max_iterations, wanted,
         omega, level, state_weight, rtol, longest, turn,
         address_of(point), address_of(phases), address_of(parameters), address_of(drive_by),
-        address_of(row), address_of(aim), told, along, ends, address_of(jacobians), d_omegas,
-        d_omegas + 8 * kept * size, address_of(closings),
+        address_of(row), address_of(aim), told, along, ends, address_of(jacobians), d_omegas, by,
+        address_of(closings),
     )  # fmt: skip
     outcome = _newton(HOST, system.content, tables.content, record.content, task)
     if outcome == OUT_OF_MEMORY:
         raise MemoryError("no memory for a motion with so many modes and stops")
     iterations, first, last = numbers[:3].tolist()
-    start, parts = 3, []
-    for length in lengths[1:]:
-        parts.append(numbers[start : start + length])
-        start += length
+    parts = [numbers[a : a + each] for a, each in zip(starts, sizes, strict=False)]
     return Found(
-        outcome, int(iterations), first, last, parts[0], parts[1].reshape(k, size), jacobians,
-        parts[2].reshape(kept, size), parts[3].reshape(kept, size, count), closings,
+        outcome, int(iterations), first, last, parts[1], parts[2].reshape(k, size), jacobians,
+        parts[3].reshape(kept, size), parts[4].reshape(kept, size, count), closings,
     )  # fmt: skip

@@ -814,7 +814,8 @@ class Trajectory:
         exact = found.copy()
         phases = found[order[inside], 0]
         carried = self.flow.ride(output, self.omega).at(phases)
-        exact[order[inside], 1] = solved @ self.flow.rows[output] + carried
+        # BLAS would sum in an order that depends on how many are wanted
+        exact[order[inside], 1] = (solved * self.flow.rows[output]).sum(axis=1) + carried
         return exact
 
     def contact_quadrature(self) -> tuple[Real, Real]:
