@@ -154,7 +154,7 @@ class RootMap:
                 return True
             if row @ effect <= 0.0:
                 return False
-            grown = np.linalg.norm(effect)
+            grown = float(np.linalg.norm(effect))
             effect, largest = effect / grown, largest / grown  # else it may grow beyond all numbers
         return True
 

@@ -130,7 +130,7 @@ def continue_branch(
     if isinstance(start, Branch):
         return extended(start, limits, options, at, progress, checkpoint, parameter)
     if limits is None:
-        raise SystemModelError("continue_branch: an orbit needs a range")
+        raise SystemModelError("continue_branch: an orbit needs a range, limits")
     check_types(
         start=(start, Orbit),
         name=(name, str),

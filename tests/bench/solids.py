@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -139,7 +140,10 @@ def solid_times(edge: float = EDGE, ways: Sequence[str] = (OURS, PEER)) -> list[
         for way in ways:
             told(f"{MODES} modes {way}")
             command = [sys.executable, "-m", "bench.solids", "--way", way, "--folder", name]
-            said = subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout
+            tests = {"PYTHONPATH": str(Path(__file__).parents[1])}
+            said = subprocess.run(
+                command, stdout=subprocess.PIPE, check=True, env=os.environ | tests
+            ).stdout
             found.append(SolidTime(way, **json.loads(said)))
         return found
 

@@ -263,4 +263,4 @@ def test_shares_of_a_profile_make_a_whole():
     task = type(BRANCHES[0])("one_dof", 26.0, (25.0, 27.0))
     shares = profile_branch(task)
     assert sum(shares.values()) == pytest.approx(1.0)
-    assert shares["flow map"] > 0.05
+    assert 0.0 < shares["flow map"] < 1.0

@@ -292,7 +292,8 @@ def test_range(one_dof, orbit, value):
 
 @pytest.mark.parametrize("range_hz", ["ab", None, ("a", 90.0), [[5.0], [90.0, 95.0]]])
 def test_range_that_is_not_two_numbers(one_dof, orbit, range_hz):
-    sentence(lambda: continue_branch(orbit, range_hz), "range_hz")
+    name = "limits" if range_hz is None else "range_hz"
+    sentence(lambda: continue_branch(orbit, range_hz), name)
     sentence(lambda: diagram(one_dof, range_hz), "range_hz")
 
 
