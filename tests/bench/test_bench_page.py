@@ -11,6 +11,7 @@ from bench.measure import Sample
 from bench.models import load_case
 from bench.page import NOTES, write_page
 from bench.run import auto_flip_points, auto_times, sample_row, special_point_rows
+from bench.solids import OURS, PEER, SolidTime
 from bench.studies import (
     BRANCHES,
     AtlasTime,
@@ -194,6 +195,8 @@ def stub_measurements(monkeypatch):
     monkeypatch.setattr(studies, "impact_times", lambda: IMPACTS)
     monkeypatch.setattr(studies, "atlas_times", lambda: [AtlasTime("one_dof", 2.0, 100, 6000)])
     monkeypatch.setattr(studies, "vain_searches", lambda: SEARCHES)
+    solids = [SolidTime(way, 300, 9.0, 1.0, (50.0, 80.0)) for way in (OURS, PEER)]
+    monkeypatch.setattr(run, "solid_times", lambda: solids)
     monkeypatch.setattr(run.throughput, "resonance_rates", lambda: {20.0: 3000.0})
     monkeypatch.setattr(studies, "profile_branch", lambda task: {"flow map": 0.6, "walk": 0.4})
 
