@@ -9,6 +9,7 @@ import argparse
 import json
 import os
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -64,7 +65,7 @@ def write_bracket(edge: float, path: Path) -> None:
     """Mesh an angle with a hole in its longer arm by edges of a length in m, and write it."""
     import gmsh
 
-    gmsh.initialize()
+    gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         arm = gmsh.model.occ.addBox(0.0, 0.0, 0.0, 0.5, 0.1, 0.06)
@@ -84,6 +85,8 @@ def write_bracket(edge: float, path: Path) -> None:
         gmsh.write(str(path))
     finally:
         gmsh.finalize()
+        if hasattr(signal, "SIGPIPE"):  # Gmsh makes a broken pipe deadly
+            signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 def assembled(path: Path) -> fem.StructureComponent:
