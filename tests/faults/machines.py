@@ -11,10 +11,11 @@ import numpy as np
 from scene_mutations import document
 
 SMALL = {"search_points": 1, "max_step": 0.2, "rtol": 1e-7}
+BRIEF = 1.005  # of the lowest frequency: a range of a few points
 Rows = list[list[float]]
 
 
-def machine(seed: int, *, explored: bool = False) -> str:
+def machine(seed: int, *, explored: bool = False, brief: bool = False) -> str:
     """The scene of a machine with natural frequencies about 1 rad/s, as a TOML document."""
     rng = np.random.default_rng(seed)
     kinds = (gears, body_in_box, chain_between_walls, masses_on_stops)
@@ -22,13 +23,14 @@ def machine(seed: int, *, explored: bool = False) -> str:
     places = list(tree["matrices"]["interfaces"])
     tree["excitation"] = drives(rng, places)
     low = float(rng.uniform(0.3, 2.0)) / (2.0 * np.pi)
+    high = low * float(rng.choice((1.05, 1.3)))
     tree["continuation"] = {
         **SMALL,
-        "range_hz": [low, low * float(rng.choice((1.05, 1.3)))],
+        "range_hz": [low, BRIEF * low if brief else high],
         "periods": [[1], [1], [1, 2]][rng.integers(3)],
     }
     if explored:
-        del tree["continuation"]["periods"]
+        del tree["continuation"]["periods"], tree["continuation"]["search_points"]
         tree["explore"] = {"max_period": 2, "spacing": 0.3, "starts": 2, "settling": 200}
     return document(tree)
 
