@@ -16,10 +16,10 @@ $(VENV)/.installed: pyproject.toml compile_engine.py $(wildcard nldyn/engine/*.[
 	touch $@
 
 paper: $(VENV)/.installed
-	$(BIN)/nldyn paper --out results/paper
+	PYTHONPATH=tests $(BIN)/python -m paper --out results/paper
 
 atlas: $(VENV)/.installed
-	$(BIN)/nldyn paper --atlas --out results/atlas
+	PYTHONPATH=tests $(BIN)/python -m paper --atlas --out results/atlas
 
 # the workers share the cores: with two threads each, exponentials of 2 x 2 matrices took 200 times as
 # long on a busy machine; the order of the files is that of tests/conftest.py

@@ -19,7 +19,7 @@ LONGEST = (
     "nldyn/io/test_resume.py",
     "nldyn/flow/test_contacts.py",
     "nldyn/longterm/test_longterm.py",
-    "nldyn/paper/test_paper_starts.py",
+    "paper/test_paper_starts.py",
 )
 
 

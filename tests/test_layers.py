@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 # from the roof to the ground; rooms on one floor do not know each other
 FLOORS = {
-    "nldyn": "app paper report plot|scene longterm|reduction|io search curves branches bifurcations"
+    "nldyn": "app report plot|scene longterm|reduction|io search curves branches bifurcations"
     " orbits flow runtime|system engine base",
     "fem": "render assembly checks elements formats model mesh base",
     "cms": "checks reduction solvers|files component base",
@@ -26,15 +26,15 @@ FLOOR = {
 ROOMS = [(package, room) for package, floors in FLOOR.items() for room in floors]
 # who may import what of others
 KEPT_TO = {
-    "fem": {"reduction", "scene", "report", "paper", "app"},
-    "cms": {"reduction", "scene", "report", "paper", "app"},
+    "fem": {"reduction", "scene", "report", "app"},
+    "cms": {"reduction", "scene", "report", "app"},
     "h5py": {"io"},
-    "matplotlib": {"plot", "report", "paper"},
+    "matplotlib": {"plot", "report"},
     "plotly": {"report"},
     "click": {"app"},
     "pydantic": {"scene"},
 }
-ABOVE_IMPORTS_IN_FUNCTIONS = {"scene", "report", "paper", "app", "plot"}
+ABOVE_IMPORTS_IN_FUNCTIONS = {"scene", "report", "app", "plot"}
 DOORS = {*FLOORS, "nldyn.__main__"}  # the faces of the packages and ``python -m nldyn``
 
 

@@ -40,7 +40,7 @@ from nldyn.app.options import (
     view_option,
 )
 from nldyn.base.exit_codes import BAD_INPUT, INTERRUPTED, NO_GRAPHICS, NOTHING_FOUND
-from nldyn.report.console import kept_at_interrupt, plain_errors, told_what_is_kept
+from nldyn.report.console import kept_at_interrupt, plain_errors
 from nldyn.runtime.interruption import STOPPED, interrupted
 
 UNCUT = 10_000  # letters of a summary
@@ -899,26 +899,6 @@ def converge(
         click.echo(study.report())
         page = out / "convergence.html"
         click.echo(f"written to {out}; {page} is a page for a browser")
-
-
-@main.command()
-@out_option
-@click.option("--atlas", is_flag=True, help="All known branches instead, which takes hours.")
-@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
-@quiet_option
-def paper(out: Path, atlas: bool, jobs: int, quiet: bool) -> None:
-    """Reproduce the figures and numbers of the paper."""
-    with plain_errors():
-        import nldyn.paper
-        from nldyn.paper.atlas import has_charts
-        from nldyn.paper.kept import has_values, unfinished_folder
-
-        if atlas:
-            with told_what_is_kept(out, has_charts):
-                nldyn.paper.compute_atlas(out, jobs, quiet=quiet)
-        else:
-            with told_what_is_kept(unfinished_folder(out), has_values):
-                nldyn.paper.main(out, jobs, quiet=quiet)
 
 
 def check_results(out: Path, scene: Scene, replace: bool) -> None:

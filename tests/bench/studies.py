@@ -16,6 +16,9 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from paper.atlas import CHARTS, LONG, odd_part
+from paper.jobs import scene_system
+from paper.starts import Start, follow_starts, read_starts
 
 from bench import native
 from bench.engines import flow_map
@@ -29,9 +32,6 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
-from nldyn.paper.atlas import CHARTS, LONG, odd_part
-from nldyn.paper.jobs import scene_system
-from nldyn.paper.starts import Start, follow_starts, read_starts
 from nldyn.system.loads import HarmonicForce
 from nldyn.system.stop import Stop
 from nldyn.system.system import System
@@ -408,7 +408,7 @@ def published_special_points() -> list[tuple[str, float, dict[str, float]]]:
     import csv
     from importlib import resources
 
-    file = resources.files("nldyn.paper").joinpath("data/auto_special_points_harmonic.csv")
+    file = resources.files("paper").joinpath("data/auto_special_points_harmonic.csv")
     found = []
     for row in csv.DictReader(file.read_text("utf-8").splitlines()):
         auto = {

@@ -12,11 +12,11 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 from killing import same_results
+from paper.jobs import JOBS, diagrams_of, tasks_of
+from paper.workers import worker_processes
 
 from nldyn import StatePlane, basins, parameter_study, simulate, sweep
 from nldyn.base.resources import example
-from nldyn.paper.jobs import JOBS, diagrams_of, tasks_of
-from nldyn.paper.workers import worker_processes
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene
 

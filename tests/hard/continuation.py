@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from functools import cache, partial
 
 import numpy as np
+from paper.jobs import scene_system
 
 from hard.case import Case, Measured
 from nldyn.bifurcations.point import SpecialPoint
@@ -16,7 +17,6 @@ from nldyn.branches.continuation import continue_branch
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
-from nldyn.paper.jobs import scene_system
 from nldyn.system.system import System
 
 SUBJECT = "continuation at low damping"

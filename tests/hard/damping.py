@@ -9,6 +9,7 @@ from functools import partial
 import mpmath
 import numpy as np
 from bench.exact import Precision
+from paper.jobs import BILINEAR_ALPHA, STIFFNESS, scene_system
 from scipy.special import gamma
 
 from hard.case import Case, Measured
@@ -27,7 +28,6 @@ from nldyn.flow.options import FlowOptions
 from nldyn.longterm.impacts import Impacts, impacts
 from nldyn.longterm.simulation import simulate
 from nldyn.orbits.solve import solve_orbit
-from nldyn.paper.jobs import BILINEAR_ALPHA, STIFFNESS, scene_system
 from nldyn.system.loads import HarmonicForce
 from nldyn.system.stop import Stop
 from nldyn.system.system import System

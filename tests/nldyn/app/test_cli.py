@@ -12,7 +12,6 @@ import scipy.sparse
 from click.testing import CliRunner
 from fakes import diagram
 
-import nldyn.paper
 import nldyn.runtime.progress
 import nldyn.scene.run
 from nldyn import System
@@ -21,7 +20,6 @@ from nldyn.app.describe import static_flexibility
 from nldyn.base.resources import example, mesh
 from nldyn.branches.arclength import Stepper
 from nldyn.io.branches import load_branches, load_diagram, load_exploration, save_branches
-from nldyn.paper.kept import kept_folder, write_numbers
 from nldyn.search import explore as survey
 
 ONE_DOF = str(example("one_dof.toml"))
@@ -364,35 +362,10 @@ def test_check_tells_the_residual_mode_from_the_others():
     assert [row.endswith("  residual") for row in rows] == [False, True]
 
 
-def test_paper_is_handed_on(tmp_path, monkeypatch):
-    given = []
-
-    def take(out, jobs, quiet):
-        given.append((out, jobs, quiet))
-
-    monkeypatch.setattr(nldyn.paper, "main", take)
-    monkeypatch.setattr(nldyn.paper, "compute_atlas", take)
-    assert invoke("paper", "--out", tmp_path).exit_code == 0
-    assert invoke("paper", "--atlas", "--out", tmp_path, "--jobs", "3", "--quiet").exit_code == 0
-    assert given == [(tmp_path, 2, False), (tmp_path, 3, True)]
-    assert invoke("paper", "--out", tmp_path, "--jobs", "0").exit_code == 2
-
-
-def test_ctrl_c_in_the_paper_names_what_is_kept(tmp_path, monkeypatch):
-    def interrupted_after_a_while(out, jobs, quiet):
-        write_numbers(kept_folder(out) / "one.json", 1)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(nldyn.paper, "main", interrupted_after_a_while)
-    result = invoke("paper", "--out", tmp_path / "paper")
-    assert result.exit_code == 130
-    assert f"{tmp_path / 'paper.unfinished'} keeps what was computed" in result.stderr
-
-
 def test_version_and_help():
     assert invoke("--version").stdout.startswith("nldyn")
     help_text = invoke("--help").stdout
-    for verb in ("run", "check", "render", "paper"):
+    for verb in ("run", "check", "render"):
         assert verb in help_text
 
 

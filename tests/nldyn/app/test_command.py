@@ -11,9 +11,9 @@ import types
 
 import pytest
 import tqdm.std
+from paper.workers import ended_at_failure
 
 from nldyn.app import command
-from nldyn.paper.workers import ended_at_failure
 from nldyn.runtime import progress
 
 

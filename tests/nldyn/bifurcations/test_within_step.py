@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from paper.jobs import scene_system
 
 from nldyn import (
     ContinuationOptions,
@@ -19,7 +20,6 @@ from nldyn import (
 from nldyn.bifurcations.within_step import differs, passes_node, special_points_between
 from nldyn.orbits.impact_phases import impacts_by_segment
 from nldyn.orbits.starts import orbit_near
-from nldyn.paper.jobs import scene_system
 from nldyn.search.fixed_point_index import _changes
 
 

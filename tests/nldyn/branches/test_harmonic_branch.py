@@ -20,7 +20,7 @@ from nldyn.branches.peaks import resonance_peaks
 
 
 def table(name: str) -> list[dict[str, str]]:
-    text = (files("nldyn") / "paper" / "data" / name).read_text(encoding="utf-8")
+    text = (files("paper") / "data" / name).read_text(encoding="utf-8")
     return list(csv.DictReader(text.splitlines()))
 
 

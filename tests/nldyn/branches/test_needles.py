@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from branches_alike import assert_same_branches
+from paper.jobs import scene_system
 
 from nldyn import ContinuationOptions, System, continue_branch, solve_orbit
-from nldyn.paper.jobs import scene_system
 
 RANGE = (42.5, 45.5)
 SHORT = ContinuationOptions(first_step=0.004, max_step=0.004)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 from branches_alike import without
+from paper.jobs import scene_system
 from problems import THREE_HZ, between_stops, make_one_dof
 
 from nldyn import (
@@ -21,7 +22,6 @@ from nldyn import (
 from nldyn.branches.endings import Ending
 from nldyn.io import CheckpointFile
 from nldyn.io.branches import load_branches, load_diagram
-from nldyn.paper.jobs import scene_system
 from nldyn.search import ClosedWalks, Mixtures, PseudoOrbits
 from nldyn.search.exploration import steps_between
 from nldyn.search.fixed_point_index import index_gaps

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from paper.jobs import scene_system
 from problems import RANGE_HZ
 
 from nldyn import ContinuationOptions, continue_branch, find_orbits, solve_orbit
 from nldyn.orbits import OrbitSearchOptions
-from nldyn.paper.jobs import scene_system
 
 STARTS = {
     1: np.geomspace(6.0, 85.0, 10),

@@ -3,10 +3,10 @@
 import pytest
 from fakes import FakeDiagram, resonance
 
-import nldyn.paper.figures
-from nldyn.paper.evidence import nearest_unstable
-from nldyn.paper.figures import CAPTIONS, SHOWN, title, write_figures
-from nldyn.paper.page import write_page
+import paper.figures
+from paper.evidence import nearest_unstable
+from paper.figures import CAPTIONS, SHOWN, title, write_figures
+from paper.page import write_page
 
 
 @pytest.fixture
@@ -21,10 +21,8 @@ def results():
 def drawn(results, tmp_path, monkeypatch):
     """Axes of every diagram by the name of its file."""
     axes = {}
-    monkeypatch.setattr(nldyn.paper.figures, "orbits_at", lambda *_: [])
-    monkeypatch.setattr(
-        nldyn.paper.figures, "save_figure", lambda ax, stem: axes.update({stem.name: ax})
-    )
+    monkeypatch.setattr(paper.figures, "orbits_at", lambda *_: [])
+    monkeypatch.setattr(paper.figures, "save_figure", lambda ax, stem: axes.update({stem.name: ax}))
     write_figures(results, tmp_path)
     return axes
 

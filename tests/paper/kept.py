@@ -1,4 +1,4 @@
-"""What an interrupted `nldyn paper` has computed, kept beside its results until all is done.
+"""What an interrupted `make paper` has computed, kept beside its results until all is done.
 
 Diagrams are kept in HDF5 files of branches, everything else as JSON with a digest: data, no code.
 """
@@ -24,7 +24,8 @@ from nldyn.runtime.result_directory import OutputError
 from nldyn.search.diagram import Diagram
 
 ENDING = ".unfinished"
-BESIDE = ("cms", "fem", "meshes", "docs/examples")  # what results depend on, beside the package
+# what results depend on, beside the package
+BESIDE = ("cms", "fem", "meshes", "docs/examples", "tests/paper")
 SOURCES = (".py", ".c", ".h", ".csv", ".toml", ".msh", ".vtu", ".inp")
 
 

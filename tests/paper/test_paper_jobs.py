@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import nldyn.paper.checks
-from nldyn.paper.figures import SHOWN
-from nldyn.paper.jobs import (
+import paper.checks
+from nldyn.runtime.progress import silent
+from paper.figures import SHOWN
+from paper.jobs import (
     COARSE,
     JOBS,
     LOWEST_HZ,
@@ -20,8 +21,7 @@ from nldyn.paper.jobs import (
     run_job,
     tasks_of,
 )
-from nldyn.paper.starts import read_starts
-from nldyn.runtime.progress import silent
+from paper.starts import read_starts
 
 NAME = "two_dof_xi_0.001"
 
@@ -35,15 +35,15 @@ def short_job(monkeypatch):
     )  # fmt: skip
     wanted = (21.4537, 42.7222)
     starts = [s for s in read_starts(NAME) if round(s.frequency_hz, 4) in wanted]
-    monkeypatch.setattr("nldyn.paper.jobs.JOBS", (job,))
-    monkeypatch.setattr("nldyn.paper.jobs.read_starts", lambda name: starts)
+    monkeypatch.setattr("paper.jobs.JOBS", (job,))
+    monkeypatch.setattr("paper.jobs.read_starts", lambda name: starts)
     return job
 
 
 def test_the_figures_and_checks_ask_for_diagrams_that_are_computed():
     names = {job.name for job in JOBS}
     assert {job for jobs in SHOWN.values() for job in jobs} <= names
-    source = inspect.getsource(nldyn.paper.checks)
+    source = inspect.getsource(paper.checks)
     asked = set(re.findall(r'results\["([\w.]+)"\]', source))
     asked |= set(re.findall(r'partial\(_\w+, "([\w.]+)"', source))
     assert len(asked) > 5
@@ -71,7 +71,7 @@ def test_a_job_is_followed_from_its_starts_once(short_job, tmp_path, monkeypatch
     assert not is_wide(harmonic[0])
     assert all(orbit.motion is None for orbit in harmonic[0].points)
     assert len(found.of_period(2)) == 1
-    monkeypatch.setattr("nldyn.paper.jobs.computed", None)  # what is kept is not computed again
+    monkeypatch.setattr("paper.jobs.computed", None)  # what is kept is not computed again
     again = run_job(NAME, 1, tmp_path, silent)
     points = [[orbit.point for orbit in d.of_period(1)[0].points] for d in (found, again)]
     np.testing.assert_array_equal(*points)
@@ -80,7 +80,7 @@ def test_a_job_is_followed_from_its_starts_once(short_job, tmp_path, monkeypatch
 def test_a_start_that_is_no_orbit_is_told(short_job, tmp_path, monkeypatch):
     (start,) = [s for s in read_starts(NAME) if s.period == 1 and 21.0 < s.frequency_hz < 22.0]
     wrong = replace(start, state=np.array([1.0, -1.0, 1.0, -1.0]))
-    monkeypatch.setattr("nldyn.paper.jobs.read_starts", lambda name: [wrong])
+    monkeypatch.setattr("paper.jobs.read_starts", lambda name: [wrong])
     found = run_job(NAME, 1, tmp_path, silent)
     assert not found.branches
     (note,) = found.notes
@@ -94,7 +94,7 @@ def test_longer_steps_locate_the_same_special_points(short_job, tmp_path):
     for number, job in enumerate((short_job, fine)):
         (folder := tmp_path / str(number)).mkdir()
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("nldyn.paper.jobs.JOBS", (job,))
+            patch.setattr("paper.jobs.JOBS", (job,))
             (branch,) = run_job(NAME, 1, folder, silent).branches
         marks.append(sorted((s.kind, s.frequency_hz) for s in branch.special_points))
     assert [kind for kind, _ in marks[0]] == [kind for kind, _ in marks[1]]

@@ -11,7 +11,11 @@ from nldyn.base.resources import example
 from nldyn.bifurcations.point import SpecialPoint
 from nldyn.branches.branch import Branch
 from nldyn.branches.peaks import lowest_orbit, resonance_peaks
-from nldyn.paper.evidence import (
+from nldyn.scene.component import build_component
+from nldyn.scene.read import load_scene
+from nldyn.search.diagram import Diagram
+from nldyn.system.stop import hertz_stiffness
+from paper.evidence import (
     READING_TOLERANCE,
     Finding,
     describe,
@@ -24,11 +28,7 @@ from nldyn.paper.evidence import (
     special,
     unstable_share,
 )
-from nldyn.paper.jobs import BILINEAR_ALPHA, HERTZ_STIFFNESS, STIFFNESS
-from nldyn.scene.component import build_component
-from nldyn.scene.read import load_scene
-from nldyn.search.diagram import Diagram
-from nldyn.system.stop import hertz_stiffness
+from paper.jobs import BILINEAR_ALPHA, HERTZ_STIFFNESS, STIFFNESS
 
 Results = Mapping[str, Diagram]
 Check = Callable[[Results], Finding]

@@ -18,12 +18,12 @@ from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.longterm.attractors import Attractor, AttractorOptions, attractor_from
 from nldyn.longterm.lifetimes import ChaosLifetime, chaos_lifetime, two_digits
 from nldyn.orbits.orbit import check_observe
-from nldyn.paper.evidence import Finding, published_claims
-from nldyn.paper.jobs import scene_system
-from nldyn.paper.kept import kept_numbers
-from nldyn.paper.workers import Task
 from nldyn.plot.diagram import BESIDE, save_figure
 from nldyn.runtime.progress import Progress
+from paper.evidence import Finding, published_claims
+from paper.jobs import scene_system
+from paper.kept import kept_numbers
+from paper.workers import Task
 
 Way = Literal["up", "down"]
 

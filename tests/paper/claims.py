@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from nldyn.paper.chaos import CLAIMS, Chaos
-from nldyn.paper.checks import CHECKS
-from nldyn.paper.evidence import READING_TOLERANCE, Finding, published_claims
 from nldyn.report.results import write_table
 from nldyn.search.diagram import Diagram
+from paper.chaos import CLAIMS, Chaos
+from paper.checks import CHECKS
+from paper.evidence import READING_TOLERANCE, Finding, published_claims
 
 Results = Mapping[str, Diagram]
 

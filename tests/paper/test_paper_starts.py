@@ -11,7 +11,11 @@ from nldyn.branches.continuation import broken_off
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.orbit import stroboscopic
 from nldyn.orbits.starts import orbit_near
-from nldyn.paper.atlas import (
+from nldyn.runtime.progress import silent
+from nldyn.runtime.result_directory import OutputError
+from nldyn.search.collector import middle_orbit
+from nldyn.search.fixed_point_index import index_note
+from paper.atlas import (
     CHARTS,
     LONG,
     atlas_folder,
@@ -21,12 +25,8 @@ from nldyn.paper.atlas import (
     odd_part,
     start_path,
 )
-from nldyn.paper.jobs import scene_system
-from nldyn.paper.starts import Start, follow_starts, read_starts, starts_path, write_starts
-from nldyn.runtime.progress import silent
-from nldyn.runtime.result_directory import OutputError
-from nldyn.search.collector import middle_orbit
-from nldyn.search.fixed_point_index import index_note
+from paper.jobs import scene_system
+from paper.starts import Start, follow_starts, read_starts, starts_path, write_starts
 
 WITHOUT_DOUBLED = (1, 50)
 
@@ -40,7 +40,7 @@ def found():
 
 @pytest.mark.parametrize("name", [chart.name for chart in CHARTS])
 def test_starts_are_orbits_of_their_period(name):
-    """Every tenth of them; `nldyn paper` and the atlas solve for all, and tell which are none."""
+    """Every tenth of them; `make paper` and the atlas solve for all, and tell which are none."""
     chart = chart_named(name)
     flow = FlowMap(scene_system(name))
     starts = read_starts(name)
@@ -124,8 +124,8 @@ def short_chart(found, monkeypatch, tmp_path):
     chart = replace(chart_named(name), range_hz=found.range_hz, doubled=(4, 10))
     write_starts(starts_path(name, tmp_path), found.branches)
     starts = read_starts(name, tmp_path)
-    monkeypatch.setattr("nldyn.paper.atlas.CHARTS", (chart,))
-    monkeypatch.setattr("nldyn.paper.atlas.read_starts", lambda name: starts)
+    monkeypatch.setattr("paper.atlas.CHARTS", (chart,))
+    monkeypatch.setattr("paper.atlas.read_starts", lambda name: starts)
     return chart, starts
 
 
@@ -177,14 +177,12 @@ def test_what_starts_lead_to_is_kept_when_an_atlas_is_interrupted(
         return orbit_near(*arguments)
 
     with monkeypatch.context() as patch:
-        patch.setattr("nldyn.paper.starts.orbit_near", orbit_until_interrupted)
+        patch.setattr("paper.starts.orbit_near", orbit_until_interrupted)
         with pytest.raises(KeyboardInterrupt):
             follow_family(chart.name, 1, tmp_path, silent)
     start_path(tmp_path, chart.name, 1, 1).write_bytes(b"cut")  # that one is followed again
     calls = []
-    monkeypatch.setattr(
-        "nldyn.paper.starts.orbit_near", lambda *a: calls.append(a) or orbit_near(*a)
-    )
+    monkeypatch.setattr("paper.starts.orbit_near", lambda *a: calls.append(a) or orbit_near(*a))
     resumed = family_of(chart, starts, 1, tmp_path)
     assert len(calls) == len(starts) - 2 > 2
     (other := tmp_path / "other").mkdir()
@@ -205,6 +203,6 @@ def test_the_atlas_of_other_code_is_refused(tmp_path, monkeypatch):
     (tmp_path / "other" / "thesis.tex").touch()
     with pytest.raises(OutputError, match="other: holds something else than an atlas"):
         atlas_folder(tmp_path / "other")
-    monkeypatch.setattr("nldyn.paper.atlas.stamp", lambda: "another")
+    monkeypatch.setattr("paper.atlas.stamp", lambda: "another")
     with pytest.raises(OutputError, match="is an atlas of another version"):
         atlas_folder(place)

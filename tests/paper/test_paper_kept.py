@@ -1,4 +1,4 @@
-"""An interrupted `nldyn paper` goes on with what it has computed, which is data and no code."""
+"""An interrupted `make paper` goes on with what it has computed, which is data and no code."""
 
 import json
 import math
@@ -6,9 +6,10 @@ import pickle
 
 import pytest
 
-import nldyn.paper.kept
+import paper.kept
 from nldyn import System, Unbalance, continue_branch, solve_orbit
-from nldyn.paper.kept import (
+from nldyn.search.diagram import Diagram
+from paper.kept import (
     has_values,
     kept_diagram,
     kept_folder,
@@ -18,7 +19,6 @@ from nldyn.paper.kept import (
     unfinished_folder,
     write_numbers,
 )
-from nldyn.search.diagram import Diagram
 
 VALUES = [{"kind": "chaotic", "exponent": 20.25, "ended": [0, 250]}, 1.0 / 3.0]
 
@@ -108,7 +108,7 @@ def test_what_other_code_computed_is_removed(tmp_path, monkeypatch):
     assert has_values(unfinished_folder(results))
     assert kept_folder(results) == folder
     assert (folder / "value.json").exists()
-    monkeypatch.setattr(nldyn.paper.kept, "BESIDE", ())  # other sources count
+    monkeypatch.setattr(paper.kept, "BESIDE", ())  # other sources count
     other = kept_folder(results)
     assert other != folder and not folder.exists()
     assert list(unfinished_folder(results).iterdir()) == [other]

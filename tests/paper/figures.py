@@ -11,9 +11,6 @@ from matplotlib.ticker import MaxNLocator
 
 from nldyn.branches.branch import Branch
 from nldyn.orbits.orbit import Orbit
-from nldyn.paper.chaos import CAPTION, FIGURE, SHADED, Chaos
-from nldyn.paper.evidence import nearest_unstable, orbits_at
-from nldyn.paper.jobs import is_wide
 from nldyn.plot.diagram import (
     BESIDE,
     new_axes_pair,
@@ -23,6 +20,9 @@ from nldyn.plot.diagram import (
 )
 from nldyn.plot.longterm import SHADE, shade_ranges
 from nldyn.search.diagram import Diagram
+from paper.chaos import CAPTION, FIGURE, SHADED, Chaos
+from paper.evidence import nearest_unstable, orbits_at
+from paper.jobs import is_wide
 
 Results = Mapping[str, Diagram]
 

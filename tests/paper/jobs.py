@@ -15,9 +15,6 @@ from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import flow_of
 from nldyn.orbits.orbit import check_observe
 from nldyn.orbits.starts import orbit_near
-from nldyn.paper.kept import kept_diagram
-from nldyn.paper.starts import LOST, Start, is_at, keep_numbers, read_starts
-from nldyn.paper.workers import Task
 from nldyn.runtime.progress import Progress, silent
 from nldyn.scene.build import build_system
 from nldyn.scene.component import build_component
@@ -26,6 +23,9 @@ from nldyn.search.collector import Collector
 from nldyn.search.diagram import Diagram, SubharmonicSeed, diagram
 from nldyn.system.stop import Stop
 from nldyn.system.system import System
+from paper.kept import kept_diagram
+from paper.starts import LOST, Start, is_at, keep_numbers, read_starts
+from paper.workers import Task
 
 BILINEAR_ALPHA = 790.0  # section 3, from equation 3.2
 STIFFNESS = 16877.0  # N/m, section 3

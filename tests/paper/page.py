@@ -8,9 +8,9 @@ from html import escape
 from pathlib import Path
 
 from nldyn.base.version import software_version
-from nldyn.paper.claims import Claim, verdict_counts
-from nldyn.paper.figures import CAPTIONS, legend_text, title
 from nldyn.search.diagram import Diagram
+from paper.claims import Claim, verdict_counts
+from paper.figures import CAPTIONS, legend_text, title
 
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; max-width: 1100px; margin: 2em auto; padding: 0 1em; }

@@ -25,12 +25,12 @@ from nldyn.io.store import save
 from nldyn.orbits.orbit import Orbit, check_observe, stroboscopic
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import orbit_near
-from nldyn.paper.kept import read_diagram
 from nldyn.runtime.files import write_whole
 from nldyn.runtime.progress import Progress, silent
 from nldyn.search.collector import Collector, middle_orbit
 from nldyn.search.diagram import Diagram
 from nldyn.system.system import System
+from paper.kept import read_diagram
 
 DATA = Path(__file__).parent / "data"
 LONGEST = 3  # period of the orbits looked for

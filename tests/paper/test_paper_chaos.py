@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from fakes import FakeDiagram, resonance
 
-import nldyn.paper.chaos
-import nldyn.paper.figures
-from nldyn.paper.chaos import (
+import paper.chaos
+import paper.figures
+from paper.chaos import (
     EDGES_HZ,
     MODELS,
     RANGE_HZ,
@@ -24,9 +24,9 @@ from nldyn.paper.chaos import (
     tasks_of_chaos,
     write_chaos_figure,
 )
-from nldyn.paper.claims import evaluate
-from nldyn.paper.evidence import Finding
-from nldyn.paper.figures import SHOWN, write_figures
+from paper.claims import evaluate
+from paper.evidence import Finding
+from paper.figures import SHOWN, write_figures
 
 
 def swept(model: str, *ranges: tuple[float, float], ended: tuple[int, ...] = (0, 0, 0, 0)):
@@ -85,7 +85,7 @@ def test_damping_counts_flips_and_chaotic_frequencies(chaos):
 
 def test_the_rows_on_chaotic_ranges_are_decided(chaos, monkeypatch):
     flips = Finding(holds=True, text="fewer")
-    monkeypatch.setattr("nldyn.paper.claims.CHECKS", {"damping": lambda _: flips})
+    monkeypatch.setattr("paper.claims.CHECKS", {"damping": lambda _: flips})
     verdicts = {row.id: row.verdict for row in evaluate({}, chaos)}
     assert verdicts["fig4.chaos"] == "differs"  # 59 to 66 Hz: 7 of 15
     assert verdicts["fig7.chaos"] == "agrees"  # 30 to 38 Hz: 15 of 17, 58 to 63: 9 of 11
@@ -96,10 +96,8 @@ def test_the_rows_on_chaotic_ranges_are_decided(chaos, monkeypatch):
 def test_chaotic_ranges_are_shaded(chaos, tmp_path, monkeypatch):
     results = {job: FakeDiagram([resonance()]) for jobs in SHOWN.values() for job in jobs}
     axes = {}
-    monkeypatch.setattr(nldyn.paper.figures, "orbits_at", lambda *_: [])
-    monkeypatch.setattr(
-        nldyn.paper.figures, "save_figure", lambda ax, stem: axes.update({stem.name: ax})
-    )
+    monkeypatch.setattr(paper.figures, "orbits_at", lambda *_: [])
+    monkeypatch.setattr(paper.figures, "save_figure", lambda ax, stem: axes.update({stem.name: ax}))
     write_figures(results, tmp_path, chaos)
     assert {name for name, ax in axes.items() if ax.patches} == {
         "figure_4", "figure_5", "figure_7", "figure_8",
@@ -111,9 +109,9 @@ def test_chaotic_ranges_are_shaded(chaos, tmp_path, monkeypatch):
 
 def test_the_figure_shows_both_models_at_both_dampings(chaos, tmp_path, monkeypatch):
     axes = []
-    save = nldyn.paper.chaos.save_figure
+    save = paper.chaos.save_figure
     monkeypatch.setattr(
-        nldyn.paper.chaos, "save_figure", lambda ax, stem: (axes.append(ax), save(ax, stem))
+        paper.chaos, "save_figure", lambda ax, stem: (axes.append(ax), save(ax, stem))
     )
     write_chaos_figure(chaos, tmp_path)
     labels = axes[0].get_legend_handles_labels()[1]
@@ -151,8 +149,8 @@ def test_pieces_joined_are_the_sweeps_with_each_frequency_once():
 
 def test_a_piece_is_swept_both_ways_and_told_as_numbers(monkeypatch):
     """There is a stable orbit in the harmonic resonance peak."""
-    monkeypatch.setattr(nldyn.paper.chaos, "EDGES_HZ", (22.6, 23.4))
-    monkeypatch.setattr(nldyn.paper.chaos, "frequencies_hz", lambda model: ([23.0], [23.0]))
+    monkeypatch.setattr(paper.chaos, "EDGES_HZ", (22.6, 23.4))
+    monkeypatch.setattr(paper.chaos, "frequencies_hz", lambda model: ([23.0], [23.0]))
     found = sweep_piece("two_dof_xi_0.01", 0, lambda *_: None)
     assert [(s["frequency_hz"], s["way"], s["kind"]) for s in found] == [
         (23.0, "up", "periodic"), (23.0, "down", "periodic"),

@@ -7,10 +7,10 @@ import sys
 import time
 from pathlib import Path
 
-__all__ = ["compute_atlas", "main"]
+__all__ = ["compute_atlas", "compute_paper"]
 
 
-def main(out: str | Path, workers: int = 2, *, quiet: bool = False) -> None:
+def compute_paper(out: str | Path, workers: int = 2, *, quiet: bool = False) -> None:
     """Compute what the paper shows, and write figures, the table of claims and a page.
 
     Parameters
@@ -30,21 +30,21 @@ def main(out: str | Path, workers: int = 2, *, quiet: bool = False) -> None:
 
     Examples
     --------
-    >>> main("results/paper")        # doctest: +SKIP
+    >>> compute_paper("results/paper")        # doctest: +SKIP
     """
-    from nldyn.paper.chaos import (
+    from nldyn.runtime.interruption import ignored_interruption
+    from nldyn.runtime.result_directory import check_directory, result_directory
+    from paper.chaos import (
         joined_chaos,
         tasks_of_chaos,
         write_chaos_figure,
     )
-    from nldyn.paper.claims import evaluate, verdict_counts, write_claims
-    from nldyn.paper.figures import write_figures
-    from nldyn.paper.jobs import JOBS, diagrams_of, tasks_of
-    from nldyn.paper.kept import kept_folder
-    from nldyn.paper.page import write_page
-    from nldyn.paper.workers import worker_processes
-    from nldyn.runtime.interruption import ignored_interruption
-    from nldyn.runtime.result_directory import check_directory, result_directory
+    from paper.claims import evaluate, verdict_counts, write_claims
+    from paper.figures import write_figures
+    from paper.jobs import JOBS, diagrams_of, tasks_of
+    from paper.kept import kept_folder
+    from paper.page import write_page
+    from paper.workers import worker_processes
 
     check_directory(out)
     folder_kept = kept_folder(out)
@@ -88,8 +88,8 @@ def compute_atlas(out: str | Path, workers: int = 2, *, quiet: bool = False) -> 
     --------
     >>> compute_atlas("results/atlas")        # doctest: +SKIP
     """
-    from nldyn.paper.atlas import atlas_folder, write_atlas
-    from nldyn.paper.workers import worker_processes
+    from paper.atlas import atlas_folder, write_atlas
+    from paper.workers import worker_processes
 
     folder = atlas_folder(out)
     with worker_processes(workers, quiet) as processes:

@@ -17,10 +17,6 @@ from pathlib import Path
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import broken_off
 from nldyn.branches.step_control import ContinuationOptions
-from nldyn.paper.jobs import scene_system
-from nldyn.paper.kept import stamp
-from nldyn.paper.starts import follow_starts, longest_whole, read_starts
-from nldyn.paper.workers import Task, Workers
 from nldyn.plot.diagram import MARKERS, plot_diagram, save_figure
 from nldyn.report.results import write_table
 from nldyn.runtime.files import write_whole
@@ -29,6 +25,10 @@ from nldyn.runtime.result_directory import OutputError
 from nldyn.search.collector import notes_on_ends
 from nldyn.search.diagram import Diagram
 from nldyn.search.fixed_point_index import index_note
+from paper.jobs import scene_system
+from paper.kept import stamp
+from paper.starts import follow_starts, longest_whole, read_starts
+from paper.workers import Task, Workers
 
 # Branches of the larger models are long. One that is cut off by max_points would be found and
 # followed again from the next orbit.

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from fakes import FakeBranch, FakeDiagram, FakeNode, FakeOrbit, FakeSpecialPoint, resonance
 
-import nldyn.paper.checks
-from nldyn.paper.checks import CHECKS
-from nldyn.paper.claims import judged, last_digit, verdict_counts, write_claims
-from nldyn.paper.evidence import Finding, published_claims
-from nldyn.paper.page import write_page
+import paper.checks
+from paper.checks import CHECKS
+from paper.claims import judged, last_digit, verdict_counts, write_claims
+from paper.evidence import Finding, published_claims
+from paper.page import write_page
 
 
 def claim(published="100", kind="number"):
@@ -30,7 +30,7 @@ def test_every_claim_has_a_check_and_every_check_a_claim():
 
 
 def test_claims_that_the_documentation_names_exist():
-    text = (Path(__file__).parents[3] / "docs" / "results" / "paper.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "results" / "paper.md").read_text(encoding="utf-8")
     differences = text.split("## Where we differ, and why")[1]
     named = set(re.findall(r"`((?:fig|hertz|undamped|damping)[\w./]*)`", differences))
     assert len(named) > 10
@@ -87,7 +87,7 @@ class FoundPeak:
 
 def split_tops(monkeypatch, *frequencies):
     tops = [FoundPeak(hz, 1e-5, FakeOrbit(hz, 1e-5)) for hz in frequencies]
-    monkeypatch.setattr(nldyn.paper.checks, "resonance_peaks", lambda branch, range_hz: tops)
+    monkeypatch.setattr(paper.checks, "resonance_peaks", lambda branch, range_hz: tops)
     row = {**claim("27", "statement"), "id": "fig7.split"}
     return judged(row, CHECKS["fig7.split"], {"four_dof_xi_0.01": FakeDiagram([resonance()])})
 
@@ -117,7 +117,7 @@ def test_branch_b_is_judged_on_the_separate_branch_alone(monkeypatch, owner, sta
     def highest_peak(branches, low_hz, high_hz):
         return next(((b, top) for b in branches if b.name == owner), None)
 
-    monkeypatch.setattr(nldyn.paper.checks, "highest_peak", highest_peak)
+    monkeypatch.setattr(paper.checks, "highest_peak", highest_peak)
     found = FakeDiagram([main, separate])
     results = dict.fromkeys(("two_dof_xi_0.01", "two_dof_xi_0.001"), found)
     row = judged(claim("23", "statement"), CHECKS["fig4.branch.b"], results)
