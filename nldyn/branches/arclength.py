@@ -36,6 +36,7 @@ from nldyn.orbits.impact_phases import (
     impacts_by_segment,
     start_far_from_impacts,
 )
+from nldyn.orbits.multipliers import EPS
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import (
     BROKEN,
@@ -65,6 +66,7 @@ ROOM = 1.1  # times a bound: what is searched, where the bound itself is looked 
 FARTHEST_OFF = 0.75  # of the largest angle: how far, over the step, a point may lie off the tangent
 NEAR_CROSSING = 0.1  # of the step: a crossing as near as this to its end is passed by another step
 BESIDE_RESONANCE = 1e-6  # relative distance from one, where steps are lost in rounding
+LOST_IN_ROUNDING = 1e-7  # of an orbit's size, which is far more than Newton's method leaves
 SCALES = 1e-8  # relative departure from a proportional change that is rounding
 BESIDE_STEP = 0.01  # squared distance from a step, over its own, of what it passes through
 
@@ -319,6 +321,10 @@ class Stepper:
             resonance = _resonance_beside(self.stride.here.orbit)
             if resonance is not None:
                 return Ending.GROWS.told(place=f"{resonance:.9g} Hz")
+            share = _rounding(self.stride.here)
+            if share > LOST_IN_ROUNDING:
+                place = place_of(self.stride.here)
+                return Ending.LOST_IN_ROUNDING.told(place=place, share=f"{share:.1g}")
         return Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
 
     def begin_anew(self, here: BranchNode, step: float) -> None:
@@ -614,6 +620,17 @@ def _resonance_beside(orbit: Orbit) -> float | None:
     if orbit.impacts or orbit.max_penetration > 0.0:
         return None
     return orbit.system.response(orbit.omega).resonance_hz(orbit.omega, BESIDE_RESONANCE)
+
+
+def _rounding(here: BranchNode) -> float:
+    """How far rounding moves an orbit, over its size: ε by the condition of what closes it."""
+    weights = np.sqrt(here.family.metric(here.point))
+    try:
+        closing = here.family.at(here.point).jacobian
+        values = np.linalg.svd(weights[:-1, None] * closing / weights, compute_uv=False)
+    except FAILURES:
+        return 0.0
+    return EPS * float(values[0] / max(values[-1], TINY))
 
 
 def _crossing_ahead(here: BranchNode) -> BranchNode | None:

@@ -42,6 +42,9 @@ class Ending(Enum):
     CORNER = "a stop is grazed, where the curve has a corner that is not followed"
     OTHER_EXTREME = "another extreme gets as large as the one held, where that has a corner"
     GROWS = "grows without bound towards {place}, where an undamped mode resonates"
+    LOST_IN_ROUNDING = (
+        "the orbit at {place} is lost in rounding, which moves it by {share} of its size"
+    )
     GRAZES_RIGID = "grazes a rigid stop at {place}, where a multiplier tends to infinity"
     TO_REST = (
         "one more impact grazes at each of ever closer {what}: near {place} they become a "
@@ -105,7 +108,9 @@ class StopReason(str):
         return self.ending in BROKEN_OFF
 
 
-BROKEN_OFF = Ending.SHORT_STEP, Ending.MOST_POINTS, Ending.FAILS, Ending.GROWS
+BROKEN_OFF = (
+    Ending.SHORT_STEP, Ending.MOST_POINTS, Ending.FAILS, Ending.GROWS, Ending.LOST_IN_ROUNDING,
+)  # fmt: skip
 StopReasons = tuple[StopReason, StopReason]
 
 

@@ -6,7 +6,7 @@ from string import Formatter
 
 import pytest
 
-from nldyn import HarmonicForce, System, continue_branch, solve_orbit
+from nldyn import HarmonicForce, Stop, System, continue_branch, solve_orbit
 from nldyn.branches.endings import Ending, StopReason
 
 GAPS = {
@@ -15,6 +15,7 @@ GAPS = {
     "what": "frequencies",
     "points": "100",
     "step": "1e-05",
+    "share": "6e-06",
     "obstacle": "Newton's method: no convergence",
     "parameter": "gap",
     "sentence": "as an earlier version put it",
@@ -42,3 +43,23 @@ def test_an_undamped_resonance_is_told(start, end):
     assert reason.startswith("grows without bound towards 0.159154943 Hz")
     assert node.orbit.frequency_hz == pytest.approx(0.5 / math.pi, rel=1e-6)
     assert branch.stop_reasons[1 - end].ending is Ending.RANGE_END
+
+
+def test_an_undamped_motion_that_a_stop_limits_is_lost_in_rounding():
+    """Beyond the stop, the force of 1 N holds a motion of 10 MN: it keeps to the free vibration.
+
+    That is a part of x'' + x = 0 up to the stop, and one of x'' + 10 x = 9 gap behind it.
+    """
+    gap = 1e7
+    system = System.from_matrices(
+        [[1.0]], [[1.0]], {"x": [1.0]}, damping=[[0.0]], stops=[Stop.linear("x", 9.0, gap=gap)],
+        excitation=[HarmonicForce("x", 1.0)],
+    )  # fmt: skip
+    branch = continue_branch(solve_orbit(system, 0.159), (0.158, 0.3))
+    reason, orbit = branch.stop_reasons[1], branch.nodes[-1].orbit
+    assert reason.ending is Ending.LOST_IN_ROUNDING
+    assert orbit.impacts == 1
+    speed = math.sqrt(10.0 * (orbit.max_penetration + 0.1 * gap) ** 2 - 0.1 * gap**2)
+    free = 2.0 * (math.pi - math.atan2(speed, gap))
+    behind = 2.0 / math.sqrt(10.0) * math.atan2(speed / math.sqrt(10.0), 0.1 * gap)
+    assert 1.0 / orbit.frequency_hz == pytest.approx(free + behind, rel=1e-6)
