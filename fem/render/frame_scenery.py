@@ -35,6 +35,8 @@ class StopSphere:
         hit it.
     gap
         In m, from the undeformed beam to the stop; negative if they are pressed together.
+    against
+        The point of the mesh that carries the stop; unless given it stands on the ground.
 
     Raises
     ------
@@ -51,6 +53,7 @@ class StopSphere:
     radius: float | None = None
     direction: tuple[float, ...] = (0.0, 1.0)
     gap: float = 0.0
+    against: str | None = None
 
     def __post_init__(self) -> None:
         if self.radius is not None and not (math.isfinite(self.radius) and self.radius > 0.0):
@@ -218,48 +221,6 @@ def mass_block(drawing: FrameSurface, lump: PointMass, side: FloatArray) -> Any:
     if halved:
         centre[:2] -= edge / 4 * ends_at(component, node)[0]
     return oriented_box(centre, side, (edge, edge / 2 if halved else edge, edge))
-
-
-def sphere_on_post(centre: FloatArray, axis: FloatArray, radius: float, post: float) -> list[Any]:
-    """Sphere of a stop and the post of a given length that holds it along an axis."""
-    import pyvista
-
-    return [
-        pyvista.Sphere(radius=radius, center=centre, theta_resolution=32, phi_resolution=32),
-        pyvista.Cylinder(
-            center=centre + post / 2 * axis,
-            direction=axis,
-            radius=0.55 * radius,
-            height=post,
-            resolution=32,
-        ),
-    ]
-
-
-def drawn_radius(mark: float) -> float:
-    """Radius of a stop that has none, beside marks of a size, in m."""
-    return 0.5 * mark
-
-
-def stop_solids(drawing: FrameSurface, stop: StopSphere, scale: float) -> list[Any]:
-    """The sphere at the beam's surface plus ``scale`` times the gap, and what holds it."""
-    component = drawing.component
-    mesh = component.model.mesh
-    node = mesh.node(stop.point)
-    towards = np.array(stop.direction) / math.hypot(*stop.direction)
-    surface = reach(component, node, towards)[0] + scale * stop.gap
-    axis = np.append(towards, 0.0)
-    mark = mark_size(component)
-    radius = stop.radius or drawn_radius(mark)
-    centre = mesh.points[node] + (surface + radius) * axis
-    post = max(1.6 * mark, 4.0 * radius)
-    width = max(1.1 * mark, 3.0 * radius)
-    return [
-        *sphere_on_post(centre, axis, radius, post),
-        oriented_box(
-            centre + (post + 0.15 * width) * axis, towards, (0.3 * width, 2 * width, width)
-        ),
-    ]
 
 
 def on_mirror(drawing: FrameSurface, node: int) -> bool:

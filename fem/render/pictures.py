@@ -25,11 +25,12 @@ from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError
 from fem.base.files import draft_of
 from fem.render.colouring import colour_name, surface_values
-from fem.render.frame_scenery import Block, StopSphere, mass_blocks, stop_solids, support_solids
+from fem.render.frame_scenery import Block, StopSphere, mass_blocks, support_solids
 from fem.render.frame_surface import FrameSurface, frame_surface
 from fem.render.gl import RenderError, on_screen, require_gl
-from fem.render.several import OfPart, Several, SeveralSurfaces, stops_at
-from fem.render.structure_scenery import Cube, mass_cubes, stop_bodies, support_marks
+from fem.render.several import OfPart, Several, SeveralSurfaces, Surface, stops_at
+from fem.render.stop_scenery import StopBody, largest_scale, stop_bodies
+from fem.render.structure_scenery import Cube, mass_cubes, support_marks
 from fem.render.structure_surface import StructureSurface, structure_surface, without_mirror
 from fem.render.views import MOTION, axes_of_view
 
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 
 
 AnyComponent = Component | StructureComponent | Several
-Surface = FrameSurface | StructureSurface | SeveralSurfaces
 Mass = Block | Cube | OfPart
 Image = npt.NDArray[np.uint8]
 Plotter = Any  # pyvista.Plotter while it is drawn in
@@ -120,7 +120,8 @@ def render_shape(
     title
         Text above the picture.
     scale
-        Factor on the deflection; by default a round one that makes it well visible.
+        Factor on the deflection; by default a round one that makes it well visible, but lets no
+        stop sink in by more than half its radius.
     stops
         The stops to draw.
     mirror
@@ -163,7 +164,7 @@ def render_shape(
     target = None if path is None else named(path, (".png",))
     drawing = surface_of(component, mirror)
     states = checked_states(component, u, 1)
-    factor = automatic_scale(drawing, states) if scale is None else checked_scale(scale)
+    factor = automatic_scale(drawing, states, stops) if scale is None else checked_scale(scale)
     require_gl()
     with picture(target, size) as plotter:
         moving = add_deflected(plotter, drawing, states[0], factor, colour)
@@ -422,7 +423,7 @@ def animate(
     instants = checked_times(times, len(states))
     if not (math.isfinite(fps) and fps > 0.0):
         raise ModelError(f"fps must be positive, not {fps}")
-    factor = automatic_scale(drawing, states) if scale is None else checked_scale(scale)
+    factor = automatic_scale(drawing, states, stops) if scale is None else checked_scale(scale)
     check_video(target)
     require_gl()
     with contextlib.closing(plotter_of(size, True)) as plotter:
@@ -498,11 +499,19 @@ def extent(points: FloatArray) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def automatic_scale(drawing: Surface, states: FloatArray) -> float:
-    """A factor 1, 2 or 5 times a power of ten that makes the largest deflection visible."""
+def automatic_scale(
+    drawing: Surface, states: FloatArray, stops: Sequence[StopSphere] = ()
+) -> float:
+    """A factor 1, 2 or 5 times a power of ten that makes the largest deflection visible.
+
+    It is so small that the stops do not sink in far, see `largest_scale`.
+    """
     at_rest, _ = drawing.place(np.zeros(states.shape[1]))
     largest = max(float(drawing.place(state)[1].max()) for state in states)
-    return round_number(AUTO_FRACTION * extent(at_rest) / largest) if largest > 0.0 else 1.0
+    if largest == 0.0:
+        return 1.0
+    visible = AUTO_FRACTION * extent(at_rest) / largest
+    return round_number(min(visible, largest_scale(drawing, states, stops)))
 
 
 def round_number(value: float) -> float:
@@ -578,6 +587,7 @@ class Moving:
     edges: Any
     actor: Any
     blocks: Sequence[Mass] = ()
+    stops: Sequence[tuple[StopBody, Any]] = ()  # with what pyvista draws of them
     colour: str = "displacement"
     factor_on_colour: float = 1.0
     largest: float = 0.0
@@ -594,6 +604,10 @@ class Moving:
         shape: Any = self.drawing.component.shape(u)
         for block in self.blocks:
             block.move(shape, self.factor)
+        for body, actor in self.stops:
+            shift = body.moved(self.drawing, u, self.factor)
+            if shift is not None:
+                actor.position = tuple(shift)
 
     def colour_by(self, factor: float, largest: float) -> int:
         """Set the factor on the colours and their range, 0 to about ``largest`` in SI units.
@@ -736,7 +750,7 @@ def compose(
 ) -> None:
     """Put everything around the deflected frame, with one range of colours for all states."""
     drawing = moving.drawing
-    moving.blocks = add_surroundings(plotter, drawing, moving.factor, stops)
+    add_surroundings(plotter, moving, moving.factor, stops)
     keep_room(plotter, drawing, states, moving.factor)
     largest = max(float(surface_values(drawing, u, moving.colour).max()) for u in states)
     unit, on_colour = quantity_unit(moving.colour, largest)
@@ -759,54 +773,54 @@ def add_note(plotter: Plotter, text: str, size: tuple[int, int]) -> None:
 
 def add_surroundings(
     plotter: Plotter,
-    drawing: Surface,
+    moving: Moving,
     factor: float,
     stops: Sequence[StopSphere],
-) -> list[Mass]:
-    """Draw supports, the stops and the masses; the masses are returned, because they move."""
-    marks, bodies, blocks = surroundings(drawing, factor, stops)
+) -> None:
+    """Draw supports, the stops off by ``factor`` times their gaps, and the masses."""
+    marks, bodies, moving.blocks = surroundings(moving.drawing, factor, stops)
     for solid, plane in marks:
         if plane:
             plotter.add_mesh(solid, color=PLANE, opacity=0.25, lighting=False)
         else:
             add_solid(plotter, solid, STEEL)
-    for solid in bodies:
-        add_solid(plotter, solid, STOP, smooth=solid.n_cells > 100)
-    for block in blocks:
+    moving.stops = [
+        (body, add_solid(plotter, body.solid, STOP, smooth=body.solid.n_cells > 100))
+        for body in bodies
+    ]
+    for block in moving.blocks:
         add_solid(plotter, block.solid, BLOCK)
-    return blocks
 
 
 def surroundings(
     drawing: Surface, factor: float, stops: Sequence[StopSphere]
-) -> tuple[list[tuple[Any, bool]], list[Any], list[Mass]]:
+) -> tuple[list[tuple[Any, bool]], list[StopBody], list[Mass]]:
     """Marks of the supports, bodies of the stops with ``factor`` times the gap, and the masses."""
+    bodies = [body for stop in stops for body in stop_bodies(drawing, stop, factor)]
     if not isinstance(drawing, SeveralSurfaces):
-        marks, bodies, masses = part_surroundings(drawing, factor, stops)
+        marks, masses = part_surroundings(drawing, stops)
         return marks, bodies, [*masses]
-    found: tuple[list[tuple[Any, bool]], list[Any], list[Mass]] = [], [], []
+    all_marks: list[tuple[Any, bool]] = []
+    all_masses: list[Mass] = []
     for name, part in drawing.parts.items():
-        marks, bodies, masses = part_surroundings(part, factor, stops_at(name, stops))
-        found[0].extend(marks)
-        found[1].extend(bodies)
-        found[2].extend(OfPart(name, mass) for mass in masses)
-    return found
+        marks, masses = part_surroundings(part, stops_at(name, stops))
+        all_marks.extend(marks)
+        all_masses.extend(OfPart(name, mass) for mass in masses)
+    return all_marks, bodies, all_masses
 
 
 def part_surroundings(
-    drawing: FrameSurface | StructureSurface, factor: float, stops: Sequence[StopSphere]
-) -> tuple[list[tuple[Any, bool]], list[Any], list[Block | Cube]]:
-    """The same of one component."""
+    drawing: FrameSurface | StructureSurface, stops: Sequence[StopSphere]
+) -> tuple[list[tuple[Any, bool]], list[Block | Cube]]:
+    """The marks of the supports of one component, and its masses."""
     if isinstance(drawing, StructureSurface):
-        bodies = [body for stop in stops for body in stop_bodies(drawing, stop, factor)]
-        return list(support_marks(drawing)), bodies, [*mass_cubes(drawing, stops)]
-    bodies = [body for stop in stops for body in stop_solids(drawing, stop, factor)]
-    return list(support_solids(drawing)), bodies, [*mass_blocks(drawing, stops)]
+        return list(support_marks(drawing)), [*mass_cubes(drawing, stops)]
+    return list(support_solids(drawing)), [*mass_blocks(drawing, stops)]
 
 
-def add_solid(plotter: Plotter, solid: Any, colour: str, smooth: bool = False) -> None:
-    """Draw a solid body with its sharp edges."""
-    plotter.add_mesh(
+def add_solid(plotter: Plotter, solid: Any, colour: str, smooth: bool = False) -> Any:
+    """Draw a solid body with its sharp edges; what pyvista draws is returned."""
+    return plotter.add_mesh(
         solid,
         color=colour,
         ambient=0.35,
@@ -922,7 +936,7 @@ def add_mode(
     moved = surface_moves(drawing, unit, rest)
     values, axis = signed_values(moved)
     moving = add_deflected(plotter, drawing, unit, factor, cmap=SIGNED_COLOURS)
-    moving.blocks = add_surroundings(plotter, drawing, 1.0, stops)
+    add_surroundings(plotter, moving, 1.0, stops)
     moving.move(unit)
     moving.surface.point_data["colour"][:] = values
     moving.range_of(-1.0, 1.0)

@@ -117,6 +117,9 @@ class SeveralSurfaces:
         return begun
 
 
+Surface = FrameSurface | StructureSurface | SeveralSurfaces
+
+
 def stops_at(name: str, stops: Sequence[StopSphere]) -> list[StopSphere]:
     """The stops of a component as it knows them, without those of others.
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem.base.arrays import FloatArray, IntArray
 from fem.mesh.cells import KINDS
@@ -15,11 +16,11 @@ from fem.render.frame_scenery import (
     BLOCK_DENSITY,
     MARK_FRACTION,
     StopSphere,
-    drawn_radius,
-    sphere_on_post,
 )
 from fem.render.structure_surface import StructureSurface
 
+ON_LINE = 1e-6  # of the structure's size: so near to a line a node lies on it
+HALF_TURN_SLACK = 1e-6  # rad
 LIFT = 1e-3
 """Held faces are drawn this part of the structure's size off its surface."""
 
@@ -126,18 +127,6 @@ def mass_cubes(drawing: StructureSurface, stops: Sequence[StopSphere]) -> list[C
     return cubes
 
 
-def stop_bodies(drawing: StructureSurface, stop: StopSphere, scale: float) -> list[Any]:
-    """The sphere at the surface plus ``scale`` times the gap, and the post that holds it."""
-    mesh = drawing.component.model.mesh
-    point = mesh.points[mesh.node(stop.point)]
-    towards = direction_of(stop)
-    surface = reach_along(drawing, point, towards) + scale * stop.gap
-    mark = MARK_FRACTION * size_of(drawing)
-    radius = stop.radius or drawn_radius(mark)
-    centre = point + (surface + radius) * towards
-    return sphere_on_post(centre, towards, radius, max(1.6 * mark, 4.0 * radius))
-
-
 def direction_of(stop: StopSphere) -> FloatArray:
     """Unit vector (3,) from the structure to the stop."""
     way = np.array([*stop.direction, 0.0][:3], dtype=np.float64)
@@ -145,10 +134,58 @@ def direction_of(stop: StopSphere) -> FloatArray:
 
 
 def reach_along(drawing: StructureSurface, point: FloatArray, towards: FloatArray) -> float:
-    """How far the undeformed surface reaches from a point along a unit vector, in m."""
+    """How far the undeformed surface reaches from a point along a unit vector, in m.
+
+    What lies beyond the end of the material, another arm of a fork, does not count.
+    """
     surface, _ = drawing.place(np.zeros(len(drawing.component.free)))
     arm = surface - point
     along = arm @ towards
     aside = np.linalg.norm(arm - along[:, None] * towards, axis=1)
-    near = aside <= aside.min() + 0.25 * MARK_FRACTION * size_of(drawing)
-    return max(float(along[near].max()), 0.0)
+    mark = MARK_FRACTION * size_of(drawing)
+    near = aside <= aside.min() + 0.25 * mark
+    near &= along <= end_of_material(drawing, point, towards) + mark
+    return float(along[near].max(initial=0.0))
+
+
+def end_of_material(drawing: StructureSurface, point: FloatArray, towards: FloatArray) -> float:
+    """How far from a point (3,) along a unit vector cells follow each other, in m.
+
+    Cells that the line through the point meets are taken from their first to their last node along
+    it. If none is at the point, infinite.
+    """
+    mesh = drawing.component.model.mesh
+    arm = mesh.points - point
+    along = arm @ towards
+    right = np.cross(towards, np.eye(3)[np.argmin(np.abs(towards))])
+    across = arm @ np.stack([right, np.cross(towards, right)], axis=1)
+    slack = ON_LINE * size_of(drawing)
+    pieces = [np.zeros((0, 2))]
+    for cells in mesh.cells.values():
+        ends = along[cells[meet_origin(across[cells], slack)]]
+        pieces.append(np.stack([ends.min(axis=1), ends.max(axis=1)], axis=1))
+    begun = np.concatenate(pieces)
+    begun = begun[np.argsort(begun[:, 0])]
+    end = -math.inf
+    for low, high in begun[begun[:, 1] >= -slack]:
+        if low > max(end, 0.0) + slack:
+            break
+        end = max(end, high)
+    return end if end > -math.inf else math.inf
+
+
+def meet_origin(points: FloatArray, slack: float) -> NDArray[np.bool_]:
+    """Whether convex hulls of points (c, k, 2) hold the origin, or a point is so near to it.
+
+    Examples
+    --------
+    >>> triangle = np.array([[0.0, 0], [1, 0], [0, 1]])
+    >>> at = np.array([[0.3, 0.3], [0.5, 0], [1, 0], [0.6, 0.6]])
+    >>> meet_origin(triangle - at[:, None], 1e-9).tolist()
+    [True, True, True, False]
+    """
+    angles = np.sort(np.arctan2(points[..., 1], points[..., 0]), axis=1)
+    turn = np.diff(angles, axis=1, append=angles[:, :1] + 2.0 * math.pi)
+    around = turn.max(axis=1) <= math.pi + HALF_TURN_SLACK
+    near = np.hypot(points[..., 0], points[..., 1]).min(axis=1) <= slack
+    return np.asarray(around | near)

@@ -9,12 +9,12 @@ const showSurface = (() => {
   const VERTEX = `#version 300 es
 in vec3 place; in vec3 move; in float colour;
 uniform mat3 turn; uniform vec3 centre; uniform vec2 shift; uniform vec2 stretch;
-uniform float amount; uniform float depth;
+uniform float amount; uniform float depth; uniform float behind;
 out vec3 seen; out float shade;
 void main() {
   seen = turn * (place + amount * move - centre);
   shade = colour;
-  gl_Position = vec4((seen.xy + shift) * stretch, -seen.z * depth, 1.0);
+  gl_Position = vec4((seen.xy + shift) * stretch, -seen.z * depth + behind, 1.0);
 }`;
   const FRAGMENT = `#version 300 es
 precision highp float;
@@ -184,12 +184,17 @@ void main() {
       return most;
     }
 
+    function largestFactor() { // at which no stop sinks in further than it may
+      const depths = surface.stops.map((stop) => Math.max(...motion.parts.map((_, a) => stop.moves.reduce((sum, move, k) => sum + move * motion.coordinates[a * stop.moves.length + k], -stop.gap))));
+      return Math.min(Infinity, ...surface.stops.map((stop, i) => depths[i] > 0 ? stop.room / depths[i] : Infinity));
+    }
+
     function show(given) {
       motion = { ...given, coordinates: new Float32Array(bytes(given.coordinates)), colours: given.colours ? new Uint8Array(bytes(given.colours)) : null, range: 1 };
       const times = given.times ? [...new Float32Array(bytes(given.times))] : [0];
       motion.parts = times.map((time) => given.period ? time / given.period : 0);
       const most = largestMove();
-      motion.factor = given.swing ? surface.reach / (most || 1) : given.factor || roundFactor(surface.reach / (most || 1));
+      motion.factor = given.swing ? surface.reach / (most || 1) : roundFactor(Math.min(surface.reach / (most || 1), largestFactor()));
       let [top, parts] = [given.top, given.parts], unit = given.unit;
       if (!motion.colours) {
         const [length, name] = lengthUnit(most);
@@ -257,9 +262,12 @@ void main() {
       gl.uniform1f(uniform("depth"), 0.2 / radius);
       gl.uniform1f(uniform("amount"), amount);
       drawPart(gl.TRIANGLES, faces, [0, 0, 0, 0], true);
+      gl.uniform1f(uniform("behind"), -0.0015); // edges lie before their faces
       drawPart(gl.LINES, edges, [0.12, 0.12, 0.12, 1], false);
-      gl.uniform1f(uniform("amount"), 0);
+      gl.uniform1f(uniform("amount"), 0); // what is at rest lies behind what it coincides with
+      gl.uniform1f(uniform("behind"), 0.004);
       drawPart(gl.LINES, edges, [0.66, 0.7, 0.74, 1], false);
+      gl.uniform1f(uniform("behind"), 0);
       gl.uniform1f(uniform("amount"), amount);
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
@@ -299,7 +307,7 @@ void main() {
       const parts = [motion.title];
       if (!motion.swing) parts.push(`deflection drawn × ${rounded(amount)}`);
       if (motion.period) parts.push(`t = ${rounded(1e3 * phase * motion.period)} ms`);
-      if (surface.stops) parts.push(surface.stops > 1 ? "red: the stops" : "red: the stop");
+      if (surface.stops.length) parts.push(surface.stops.length > 1 ? "red: the stops" : "red: the stop");
       said.textContent = parts.filter(Boolean).join("; ");
     }
 

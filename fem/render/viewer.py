@@ -21,7 +21,6 @@ from fem.render.pictures import (
     STEEL,
     STOP,
     AnyComponent,
-    Surface,
     extent,
     quantity_unit,
     round_range,
@@ -30,6 +29,8 @@ from fem.render.pictures import (
     surface_of,
     surroundings,
 )
+from fem.render.several import Surface
+from fem.render.stop_scenery import SINKING, closing, drawn_radius
 from fem.render.views import view_of_motion
 
 HERE = Path(__file__).parent
@@ -74,7 +75,7 @@ def surface_data(
         For JSON: arrays in base64. The first ``count`` points are those of the surface, the others
         those of ``bodies``: supports, masses and stops. The moves are whole numbers of 16 bits in
         units of ``quanta`` (m); stops also move by ``gap``. ``reach`` is the deflection in m that
-        is drawn at first.
+        is drawn at first, if none of ``stops`` then sinks in by more than its ``room``.
     """
     drawing = surface_of(component, mirror)
     rest, _ = drawing.place(np.zeros(shapes.shape[0]))
@@ -104,7 +105,14 @@ def surface_data(
         ],
         "quanta": quanta.tolist(),
         "reach": AUTO_FRACTION * extent(rest),
-        "stops": len(stops),
+        "stops": [
+            {
+                "moves": [closing(drawing, shape, stop) for shape in shapes.T],
+                "gap": stop.gap,
+                "room": SINKING * drawn_radius(drawing, stop),
+            }
+            for stop in stops
+        ],
         "view": view_of_motion(rest, shown).tolist(),
     }
 
@@ -118,9 +126,11 @@ def _bodies(
     still = [np.zeros((1, 3))] * shapes.shape[1]
     for solid, plane in marks:
         yield _body(solid, colour_of(PLANE, 0.25) if plane else colour_of(STEEL), still)
-    for solid, off in zip(touching, standing, strict=True):
-        gap = np.asarray(off.points - solid.points)[:1]
-        yield _body(solid, colour_of(STOP), still, gap)
+    for body, off in zip(touching, standing, strict=True):
+        carried = [body.moved(drawing, shape, 1.0) for shape in shapes.T]
+        moves = [np.zeros((1, 3)) if move is None else move[None] for move in carried]
+        gap = np.asarray(off.solid.points - body.solid.points)
+        yield _body(body.solid, colour_of(STOP), moves, gap)
     for mass in masses:
         moves = []
         rest = np.array(mass.solid.points, dtype=np.float64)

@@ -153,7 +153,9 @@ def kept_surface(page: Path, diagram: Diagram) -> Mapping[str, Any] | None:
         return None
     modes = diagram.branches[0].points[0].system.size
     found: Mapping[str, Any] | None = surface
-    return found if found and len(found.get("moves", ())) == modes else None
+    if not found or len(found.get("moves", ())) != modes or isinstance(found.get("stops"), int):
+        return None  # of another structure, or of a page of an earlier version
+    return found
 
 
 def as_diagram(found: object) -> Diagram:

@@ -504,26 +504,11 @@ class Drawing:
                 state,
                 self.folder / f"deepest_{name}.png",
                 title=with_stops_not_drawn(what_is_drawn(orbit, impact), self.scene),
-                scale=self.visible_scale(state, impact),
                 stops=stops,
                 mirror=_mirror(self.scene),
                 colour=colour,
                 view=self.view,
             )
-
-    def visible_scale(self, state: NDArray[np.float64], impact: Impact | None) -> float:
-        """Factor on the deflection at which the stop sinks in by half its radius at most."""
-        from fem.render.frame_scenery import MARK_FRACTION, drawn_radius
-        from fem.render.pictures import automatic_scale, extent, round_number, surface_of
-
-        drawing = surface_of(self.component, _mirror(self.scene))
-        factor = automatic_scale(drawing, state[None])
-        stop = None if impact is None else stop_sphere(self.scene, impact.stop)
-        if impact is None or stop is None or impact.penetration == 0.0:
-            return factor
-        size = extent(drawing.place(np.zeros_like(state))[0])
-        radius = stop.radius or drawn_radius(MARK_FRACTION * size)
-        return min(factor, round_number(0.5 * radius / impact.penetration))
 
     def motion(self, orbit: Orbit, video: str) -> None:
         """Animate one period of the orbit."""

@@ -21,8 +21,13 @@ from fem.render import (
     render_modes,
     render_shape,
 )
-from fem.render.frame_scenery import mass_blocks, stop_solids
+from fem.render.frame_scenery import mass_blocks
 from fem.render.frame_surface import frame_surface
+from fem.render.pictures import automatic_scale
+from fem.render.several import Several
+from fem.render.stop_scenery import largest_scale, penetration, stop_bodies
+
+STEEL = fem.Material(2.1e11, 7800.0)
 
 
 @pytest.fixture
@@ -271,10 +276,10 @@ def test_stop_touches_the_beam_at_rest(half_beam):
     """The sphere's lowest point is the beam's upper surface, or above it by the scaled gap."""
     drawing = frame_surface(half_beam)
     for gap, scale in ((0.0, 1.0), (2e-4, 50.0)):
-        sphere = stop_solids(drawing, StopSphere("middle", 0.005, gap=gap), scale)[0]
+        sphere = stop_bodies(drawing, StopSphere("middle", 0.005, gap=gap), scale)[0].solid
         assert sphere.bounds[2] == pytest.approx(0.005 + gap * scale, abs=1e-5)
         assert np.mean(sphere.bounds[:2]) == pytest.approx(0.66, abs=1e-5)
-    below = stop_solids(drawing, StopSphere("middle", 0.005, direction=(0.0, -2.0)), 1.0)[0]
+    below = stop_bodies(drawing, StopSphere("middle", 0.005, direction=(0.0, -2.0)), 1.0)[0].solid
     assert below.bounds[3] == pytest.approx(-0.005, abs=1e-5)
 
 
@@ -304,3 +309,68 @@ def test_scales_are_round_and_units_readable():
     assert pictures.length_unit(0.9e-3) == ("mm", 1e3)
     assert pictures.length_unit(0.7) == ("m", 1.0)
     assert pictures.length_unit(3e-9) == ("nm", 1e9)
+
+
+@pytest.fixture
+def tongs():
+    """Two cantilevers beside each other, 20 mm apart, with a stop between their ends."""
+    arm = fem.BeamPart(STEEL, fem.RectangularSection(0.01, 0.01))
+    parts = {}
+    for name, y in (("lower", 0.0), ("upper", 0.03)):
+        mesh = fem.frame_mesh({"root": (0, y), "tip": (0.5, y)}, [("arm", "root", "tip", 4)])
+        supports = [fem.Support("root", ("x", "y", "rotation"))]
+        ends = {"tip": fem.Interface("tip", "y")}
+        parts[name] = fem.assemble(fem.FrameModel(mesh, {"arm": arm}, supports, interfaces=ends))
+    return Several(parts)
+
+
+def bent(tongs, lower, upper):
+    """Displacements of which the tips have those along y."""
+    found = []
+    for part, size in zip(tongs.parts.values(), (lower, upper), strict=True):
+        pushed = np.linalg.solve(part.stiffness.toarray(), part.interfaces["tip"])
+        found.append(size * pushed / (part.interfaces["tip"] @ pushed))
+    return np.concatenate(found)
+
+
+def test_a_stop_between_two_points_is_carried_by_one_and_marked_at_the_other(tongs):
+    """The sphere keeps off the surface by gap and relative motion; its rod leads to the carrier."""
+    drawing = pictures.surface_of(tongs)
+    stop = StopSphere("lower.tip", 0.004, (0.0, 1.0), gap=2e-3, against="upper.tip")
+    u, scale = bent(tongs, 1e-3, -5e-4), 3.0
+    ball, rod, disc = stop_bodies(drawing, stop, scale)
+    assert (ball.carrier, rod.carrier, disc.carrier) == ("upper.tip", "upper.tip", "lower.tip")
+    bottom = ball.solid.bounds[2] + ball.moved(drawing, u, scale)[1]
+    touched = 0.005 + scale * 1e-3  # the upper side of the lower arm
+    assert bottom - touched == pytest.approx(scale * (2e-3 - 1.5e-3), abs=1e-5)
+    assert rod.solid.bounds[3] == pytest.approx(0.03, abs=1e-6)
+    assert np.mean(disc.solid.bounds[2:4]) == pytest.approx(0.005, abs=1e-6)
+
+
+def test_no_stop_sinks_in_by_more_than_half_its_radius(tongs):
+    """In one state or several, by relative motion, and without contact not limited."""
+    drawing = pictures.surface_of(tongs)
+    stop = StopSphere("lower.tip", 0.004, (0.0, 1.0), gap=1e-3, against="upper.tip")
+    deep = bent(tongs, 1e-3, -5e-4)
+    assert penetration(drawing, deep, stop) == pytest.approx(5e-4)
+    assert largest_scale(drawing, np.array([deep, -deep]), [stop]) == pytest.approx(4.0)
+    assert automatic_scale(drawing, np.array([deep, -deep]), [stop]) == 2.0
+    assert automatic_scale(drawing, np.array([-deep]), [stop]) > 10.0
+
+
+def test_a_stop_of_a_component_that_is_not_there(tongs):
+    with pytest.raises(fem.ModelError, match="there is no component 'middle'"):
+        stop_bodies(pictures.surface_of(tongs), StopSphere("middle.tip"), 1.0)
+
+
+def test_pictures_move_what_is_carried(with_gl, tongs, tmp_path):
+    stop = StopSphere("lower.tip", 0.004, (0.0, 1.0), gap=2e-3, against="upper.tip")
+    times = np.arange(3) / 3
+    states = np.array([bent(tongs, size, -size) for size in (0.0, 5e-3, -5e-3)])
+    animate(tongs, states, tmp_path / "tongs.gif", times=times, stops=[stop], scale=1.0)
+    rows = []
+    for image in iio.imread(tmp_path / "tongs.gif"):
+        red = image[..., :3].astype(int)
+        seen = (red[..., 0] > 120) & (red[..., 1] < 100) & (red[..., 2] < 100)
+        rows.append(np.nonzero(seen[80:440])[0].mean())
+    assert rows[1] > rows[0] + 2 and rows[2] < rows[0] - 2

@@ -29,7 +29,7 @@ from fem.render import (
 from fem.render.colouring import surface_values
 from fem.render.frame_surface import frame_surface
 from fem.render.page import shapes_of
-from fem.render.structure_scenery import support_marks
+from fem.render.structure_scenery import reach_along, support_marks
 from fem.render.structure_surface import structure_surface
 from fem.render.views import view_of_motion
 
@@ -317,3 +317,25 @@ def test_a_view_shows_what_moves():
         assert np.linalg.det(axes) == pytest.approx(1.0)
         assert np.linalg.norm(axes[:2] @ way) > 0.9
         assert np.linalg.norm(axes[:2] @ sides[name]) > 0.75 * np.linalg.norm(sides[name])
+
+
+def test_a_stop_touches_its_own_arm_of_a_fork():
+    """From a corner along an edge, from inside the arm, and from a face through the thickness."""
+    arms = [
+        fem.box_mesh("fork", (0.5, 0.02, 0.02), (5, 2, 1), origin=(0.0, y, 0.0)) for y in (0.0, 0.1)
+    ]
+    foot = fem.box_mesh("fork", (0.1, 0.08, 0.02), (1, 4, 1), origin=(0.0, 0.02, 0.0))
+    mesh = fem.joined([*arms, foot])
+    component = fem.assemble(
+        fem.StructureModel(
+            fem.StructureMesh(mesh.points, mesh.cells, mesh.groups, {}),
+            {"fork": fem.SolidPart(STEEL)},
+        )
+    )
+    drawing = structure_surface(component)
+    up = np.array([0.0, 1.0, 0.0])
+    for y in (0.0, 0.01, 0.02):
+        for x, z in ((0.5, 0.02), (0.5, 0.01), (0.4, 0.0)):
+            found = reach_along(drawing, np.array([x, y, z]), up)
+            assert found == pytest.approx(0.02 - y, abs=1e-9)
+    assert reach_along(drawing, np.array([0.0, 0.0, 0.0]), up) == pytest.approx(0.12)

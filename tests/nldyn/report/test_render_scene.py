@@ -2,11 +2,12 @@
 
 import csv
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
 import fem.render
+from fem.render.pictures import surface_of
+from fem.render.stop_scenery import penetration
 from nldyn.app.cli import main
 from nldyn.base.resources import example, mesh
 from nldyn.report.render import (
@@ -118,9 +119,10 @@ def test_pictures_show_all_stops_that_lie_along_an_axis(tmp_path, monkeypatch):
             ("middle", (0.0, 1.0), 1.0), ("middle", (0.0, 1.0), 0.0), ("middle", (0.0, -1.0), 0.0),
         ]  # fmt: skip
     assert -component.interfaces["middle"] @ u == pytest.approx(depth[2], rel=1e-6)
-    size = np.linalg.norm(np.ptp(component.model.mesh.points, axis=0))
-    within_stop = fem.render.pictures.round_number(0.5 * 0.01 * 2.0 * size / depth[2])
-    assert options["scale"] == pytest.approx(within_stop)
+    soft = options["stops"][2]
+    sunk = penetration(surface_of(component, "middle"), u, soft)
+    assert sunk == pytest.approx(depth[2], rel=1e-6)
+    assert "not drawn: stop at 'turn', which acts on a rotation" in options["title"]
 
 
 def test_all_pictures(tmp_path, monkeypatch):

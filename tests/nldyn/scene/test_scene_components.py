@@ -13,11 +13,12 @@ from scipy.linalg import eigh
 import fem
 import fem.render
 from fem.render.pictures import surface_of
+from fem.render.stop_scenery import penetration
 from nldyn import SceneError, solve_orbit
 from nldyn.app.cli import main
-from nldyn.base.resources import example
+from nldyn.base.resources import example, mesh
 from nldyn.report.again import drawn_of
-from nldyn.report.stop_spheres import stops_to_draw
+from nldyn.report.stop_spheres import not_drawn, stops_to_draw
 from nldyn.scene.backbone import undamped
 from nldyn.scene.build import build_parts, build_reduced, build_structure, build_system
 from nldyn.scene.case_fingerprints import case_fingerprints
@@ -326,6 +327,41 @@ def test_of_a_mesh_and_matrices_the_mesh_is_drawn(tmp_path, monkeypatch):
     }
     (stop,) = stops_to_draw(load_scene(scene))
     assert (stop.point, stop.direction, stop.gap) == ("frame.CORNER-R", (1.0, 0.0), 2e-3)
+
+
+def test_stops_between_two_meshes_are_drawn_and_the_reason_is_told_for_others(tmp_path):
+    """Of the halves of a beam the lower of two sides moves as the model says it does."""
+    pairs = ("tip", "y"), ("turn", "turn"), ("tip", "x")
+    stops = "".join(
+        f'[[stops]]\nat = "outer.{one}"\nagainst = "inner.{other}"\nlaw = "linear"\n'
+        "stiffness = 1e3\ngap = 1e-3\ndirection = -1\n"
+        for one, other in pairs
+    )
+    scene = halves(tmp_path, FORCE + JOINTS + stops)
+    structure = build_structure(scene)
+    drawn = drawn_of(scene, structure)
+    (stop,) = drawn.stops
+    assert (stop.point, stop.against, stop.gap) == ("outer.right", "inner.right", 1e-3)
+    q = np.arange(1.0, structure.reduced.size + 1.0)
+    system = build_system(scene, structure.reduced)
+    sunk = penetration(surface_of(drawn.component), drawn.reduced.expand(q), stop)
+    assert sunk == pytest.approx(system.stop_vector(system.stops[0]) @ q - 1e-3, rel=1e-9)
+    assert not_drawn(scene) == [
+        "stop at 'outer.turn' against 'inner.turn', which acts on a rotation",
+        "stop at 'outer.tip' against 'inner.x', which acts along two axes",
+    ]
+
+
+def test_a_stop_against_what_has_no_mesh_is_told(tmp_path):
+    text = example("portal_with_absorber.toml").read_text()
+    text = text.replace("../../meshes/", f"{mesh('portal.inp').parent.as_posix()}/")
+    text = text.replace(
+        'at = "frame.corner"\nlaw', 'at = "frame.corner"\nagainst = "absorber.mass"\nlaw'
+    )
+    scene = parse_scene(text, tmp_path / "s.toml")
+    assert stops_to_draw(scene) == []
+    (told,) = not_drawn(scene)
+    assert told == "stop at 'frame.corner' against 'absorber.mass', which has no mesh at one side"
 
 
 def test_check_tells_of_every_component():
