@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 from repeated import run_through
 
-from nldyn import HarmonicForce, Stop, System, SystemModelError, find_orbits, harmonics, solve_orbit
+from nldyn import (
+    HarmonicForce,
+    RigidStop,
+    Stop,
+    System,
+    SystemModelError,
+    find_orbits,
+    harmonics,
+    solve_orbit,
+)
 
 
 def test_a_linear_system_answers_at_the_frequency_of_the_force():
@@ -47,6 +56,29 @@ def test_lines_are_the_response_to_force_and_contact(one_dof, frequency, period)
     transfer = v[0] ** 2 / (natural**2 - omega**2 + 1j * damping * omega)
     assert lines.phasor == pytest.approx(
         transfer * (drive - contact), rel=1e-7, abs=1e-9 * lines.amplitude.max()
+    )
+
+
+@pytest.mark.parametrize(("frequency", "impacts"), [(9.0, 4), (17.0, 1)])
+def test_lines_are_the_response_to_force_and_impulses(frequency, impacts):
+    """Every mode answers by its transfer function; velocities jump, and no sample need see it."""
+    shape, natural = np.array([0.6, 0.3]), 2.0 * np.pi * np.array([13.0, 40.0])
+    system = System.from_modal(
+        natural / (2.0 * np.pi), {"tip": shape}, modal_damping=0.02,
+        stops=[RigidStop("tip", 0.7, gap=1e-5)], excitation=[HarmonicForce("tip", 2.0, 25.0)],
+    )  # fmt: skip
+    orbit = find_orbits(system, frequency, 1)[0]
+    assert orbit.impacts == impacts
+    lines = harmonics(orbit, orders=40)
+    orders = np.arange(lines.phasor.size)
+    turns = np.exp(-1j * np.outer(orders, [orbit.omega * hit.time for hit in orbit.impact_list]))
+    forces = -2.0 / orbit.duration * turns @ [hit.impulse for hit in orbit.impact_list]
+    forces[0] *= 0.5
+    forces[1] += 2.0 * np.exp(1j * np.radians(25.0))
+    omega = orders[:, None] * orbit.omega
+    transfer = shape**2 / (natural**2 - omega**2 + 0.04j * natural * omega)
+    assert lines.phasor == pytest.approx(
+        forces * transfer.sum(axis=1), rel=1e-7, abs=1e-9 * lines.amplitude.max()
     )
 
 
