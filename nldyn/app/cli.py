@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -22,7 +22,7 @@ from nldyn.app.describe import (
     describe_system,
     described_as_json,
     echo_parts,
-    print_json,
+    json_text,
     special_counts,
 )
 from nldyn.app.options import (
@@ -32,15 +32,15 @@ from nldyn.app.options import (
     json_option,
     mesh_option,
     number_list,
-    out_option,
     plane_state,
     quiet_option,
     replace_option,
     scene_argument,
     view_option,
 )
+from nldyn.app.writing import Told, Work, check_results, writes_results, written_by
 from nldyn.base.exit_codes import BAD_INPUT, INTERRUPTED, NO_GRAPHICS, NOTHING_FOUND
-from nldyn.report.console import kept_at_interrupt, plain_errors
+from nldyn.report.console import plain_errors
 from nldyn.runtime.interruption import STOPPED, interrupted
 
 UNCUT = 10_000  # letters of a summary
@@ -130,84 +130,55 @@ def main() -> None:
 
 
 @main.command()
-@scene_argument
-@out_option
-@mesh_option
+@writes_results(kept=True)
 @click.option("--log", is_flag=True, help="Draw the displacement on a logarithmic axis.")
-@click.option(
-    "--replace",
-    is_flag=True,
-    help="Compute anew, also where DIR holds finished results of this scene or of another one.",
-)
 @json_option
-@quiet_option
 @jobs_option
-def run(
-    scene: Path,
-    out: Path,
-    mesh_folders: tuple[Path, ...],
-    log: bool,
-    replace: bool,
-    as_json: bool,
-    quiet: bool,
-    jobs: int,
-) -> None:
+def run(work: Work, log: bool, as_json: bool, jobs: int) -> Told:
     """Compute the branches of a scene, and write tables, a diagram and a report.
 
     The report is one page for a browser, report.html. What DIR holds of the same scene, finished,
     is not computed again.
     """
-    with plain_errors():
-        from nldyn.runtime.progress import progress_line
-        from nldyn.scene.read import load_scene
+    from nldyn.io.checkpoint import CheckpointFile
+    from nldyn.report.again import computed_before, drawn_of, read_summary
+    from nldyn.report.results import write_results
+    from nldyn.scene.run import compute, explore_scene, parts_of_work, structure_of
+    from nldyn.search.exploration import Exploration
 
-        start = time.perf_counter()
-        loaded = load_scene(scene, mesh_folders)
-        check_results(out, loaded, replace)
-        from nldyn.io.checkpoint import CheckpointFile
-        from nldyn.report.again import computed_before, drawn_of, read_summary
-        from nldyn.report.results import write_results
-        from nldyn.scene.run import compute, explore_scene, parts_of_work, structure_of
-        from nldyn.search.exploration import Exploration
-
-        with kept_at_interrupt(out) as unfinished:
-            kept = CheckpointFile(unfinished)
-            with progress_line(quiet) as line:
-                parts = parts_of_work(loaded, line)
-                structure = structure_of(loaded, parts.part("model"))
-                parts.end("model")
-                before = None if replace else computed_before(out, loaded, structure)
-                work = (loaded, parts.part("branches"), kept, jobs, structure)
-                found = before or (explore_scene(*work) if loaded.explore else compute(*work))
-                if before is None or log:
-                    line("report", 0.0, 1.0)
-                    yscale: Literal["linear", "log"] = "log" if log else "linear"
-                    drawn = drawn_of(loaded, structure)
-                    write_results(found, out, loaded, drawn=drawn, yscale=yscale)
-        seconds = time.perf_counter() - start
-        coverage = found.coverage_lines() if isinstance(found, Exploration) else []
-        diagram = found.diagram if isinstance(found, Exploration) else found
-        told = read_summary(out)
-        if as_json:
-            print_json(
-                {
-                    "scene": str(scene),
-                    "out": str(out),
-                    "report": str(out / "report.html"),
-                    "seconds": seconds,
-                    "special_points": special_counts(diagram),
-                    "coverage": coverage,
-                    **told,
-                }
-            )
-        else:
-            lines = [*told.get("answer", []), *coverage, describe(diagram, seconds, out)]
-            click.echo("\n".join(lines))
-            if before is not None:
-                click.echo("all of it was computed before; '--replace' computes it anew")
-        if not diagram.branches:
-            click.echo("nldyn: no periodic orbit was found; the tables are empty", err=True)
-            sys.exit(NOTHING_FOUND)
+    scene, out = work.scene, work.out
+    assert work.unfinished is not None
+    parts = parts_of_work(scene, work.line)
+    structure = structure_of(scene, parts.part("model"))
+    parts.end("model")
+    before = None if work.replace else computed_before(out, scene, structure)
+    given = scene, parts.part("branches"), CheckpointFile(work.unfinished), jobs, structure
+    found = before or (explore_scene(*given) if scene.explore else compute(*given))
+    if before is None or log:
+        work.line("report", 0.0, 1.0)
+        yscale: Literal["linear", "log"] = "log" if log else "linear"
+        write_results(found, out, scene, drawn=drawn_of(scene, structure), yscale=yscale)
+    seconds = time.perf_counter() - work.start
+    coverage = found.coverage_lines() if isinstance(found, Exploration) else []
+    diagram = found.diagram if isinstance(found, Exploration) else found
+    told = read_summary(out)
+    if as_json:
+        said = {
+            "scene": str(scene.file),
+            "out": str(out),
+            "report": str(out / "report.html"),
+            "seconds": seconds,
+            "special_points": special_counts(diagram),
+            "coverage": coverage,
+            **told,
+        }
+        lines = [json_text(said)]
+    else:
+        lines = [*told.get("answer", []), *coverage, describe(diagram, seconds, out)]
+        if before is not None:
+            lines.append("all of it was computed before; '--replace' computes it anew")
+    fault = "" if diagram.branches else "no periodic orbit was found; the tables are empty"
+    return Told(lines, fault, NOTHING_FOUND)
 
 
 @main.command()
@@ -322,7 +293,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
             check_run()
             table = mode_table(loaded, Structure(component, reduced))
             count = sum(part.mass.shape[0] for part in parts.values()) or None
-            print_json({
+            click.echo(json_text({
                 "scene": str(scene),
                 "title": loaded.title,
                 "degrees_of_freedom": count,
@@ -331,7 +302,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
                 **described_as_json(system),
                 "at_rest": at_rest,
                 "notes": remarks(loaded, system),
-            })  # fmt: skip
+            }))  # fmt: skip
             return
         echo_parts(parts)
         described = describe_system(system, 0 if reduced is None else reduced.residual_modes)
@@ -426,13 +397,13 @@ def modes(
             told["against"] = [
                 dict(zip(compared.columns(), row, strict=True)) for row in compared.rows()
             ]
-        print_json(told)
+        click.echo(json_text(told))
     else:
         click.echo(table.report(modes or ()))
         if compared is not None:
             click.echo(compared.report(tuple(modes or ())))
         if out is not None:
-            click.echo(f"written to {out}: {written_by(out, 'modes')}")
+            click.echo(written_by(out, "modes"))
     if missing:
         click.echo(f"nldyn: {missing}", err=True)
         sys.exit(NO_GRAPHICS)
@@ -474,10 +445,7 @@ def open_page(page: Path) -> None:
 
 
 @main.command()
-@scene_argument
-@out_option
-@mesh_option
-@replace_option
+@writes_results()
 @click.option(
     "--mode",
     type=click.IntRange(1, 100_000),
@@ -497,46 +465,38 @@ def open_page(page: Path) -> None:
     is_flag=True,
     help="Follow the phase resonance of the damped, forced structure beside it, too.",
 )
-@quiet_option
 def backbone(
-    scene: Path,
-    out: Path,
-    mesh_folders: tuple[Path, ...],
-    replace: bool,
+    work: Work,
     mode: int,
     amplitude_m: float,
     forced: bool,
-    quiet: bool,
-) -> None:
+) -> Told:
     """Follow the free motions of a scene, without its damping and excitation, from a mode on.
 
     Writes backbone.csv and a picture of amplitude against frequency; with --forced also
     phase_resonance.csv, up to the strength of the scene's excitation.
     """
-    with plain_errors():
-        from nldyn.runtime.progress import progress_line
-        from nldyn.scene.read import load_scene
+    from nldyn.report.backbone import write_backbone
+    from nldyn.scene.backbone import backbone_of, phase_resonance_of
 
-        loaded = load_scene(scene, mesh_folders)
-        check_results(out, loaded, replace)
-        from nldyn.report.backbone import write_backbone
-        from nldyn.scene.backbone import backbone_of, phase_resonance_of
+    found = backbone_of(work.scene, amplitude_m, mode)
+    resonant = phase_resonance_of(work.scene, found) if forced else None
+    write_backbone(found, work.out, work.scene.text, work.scene.title, resonant)
+    return Told([*_shown(found, resonant), written_by(work.out, "backbone")])
 
-        with progress_line(quiet):
-            found = backbone_of(loaded, amplitude_m, mode)
-            resonant = phase_resonance_of(loaded, found) if forced else None
-        write_backbone(found, out, loaded.text, loaded.title, resonant)
-    click.echo(repr(found).strip("<>"))
-    if resonant is not None:
-        click.echo(repr(resonant).strip("<>"))
-    click.echo(f"written to {out}: {written_by(out, 'backbone')}")
+
+def one_frequency_or_run_up(
+    to_hz: float | None, rate_hz_per_s: float | None, periods: int | None, exponents: bool, **_: Any
+) -> None:
+    """Refuse options of one frequency beside those of a run-up."""
+    if (to_hz is None) != (rate_hz_per_s is None):
+        raise click.UsageError("'--to-hz' and '--rate-hz-per-s' go together")
+    if to_hz is not None and (periods is not None or exponents):
+        raise click.UsageError("'--periods' and '--lyapunov' are for one frequency, not '--to-hz'")
 
 
 @main.command()
-@scene_argument
-@out_option
-@mesh_option
-@replace_option
+@writes_results(check=one_frequency_or_run_up)
 @click.option(
     "--frequency-hz",
     type=click.FloatRange(1e-6, 1e12),
@@ -573,60 +533,39 @@ def backbone(
 @click.option(
     "--lyapunov", "exponents", is_flag=True, help="Tell the largest Lyapunov exponent, too."
 )
-@quiet_option
 def simulate(
-    scene: Path,
-    out: Path,
-    mesh_folders: tuple[Path, ...],
-    replace: bool,
+    work: Work,
     frequency_hz: float,
     periods: int | None,
     transient: int,
     to_hz: float | None,
     rate_hz_per_s: float | None,
     exponents: bool,
-    quiet: bool,
-) -> None:
+) -> Told:
     """Simulate a scene in time from its [start], at one frequency or in a run-up or run-down.
 
     Writes motion.csv, the displacements and contact forces, impacts.csv, and a picture; of a
     run-up also peaks.csv. Forces may have frequencies of their own. Without a [start] the structure
     is undeformed and without speed at first.
     """
-    if (to_hz is None) != (rate_hz_per_s is None):
-        raise click.UsageError("'--to-hz' and '--rate-hz-per-s' go together")
-    if to_hz is not None and (periods is not None or exponents):
-        raise click.UsageError("'--periods' and '--lyapunov' are for one frequency, not '--to-hz'")
-    with plain_errors():
-        from nldyn.runtime.progress import progress_line
-        from nldyn.scene.read import load_scene
+    from nldyn.longterm.impacts import impacts
+    from nldyn.report.simulation import write_simulation
+    from nldyn.scene.build import directions_of
+    from nldyn.scene.simulation import simulation_of
 
-        loaded = load_scene(scene, mesh_folders)
-        check_results(out, loaded, replace)
-        from nldyn.longterm.impacts import impacts
-        from nldyn.report.simulation import write_simulation
-        from nldyn.scene.build import directions_of
-        from nldyn.scene.simulation import simulation_of
-
-        with progress_line(quiet) as line:
-            found = simulation_of(
-                loaded, frequency_hz, periods=periods or 100, transient=transient,
-                exponents=exponents, to_hz=to_hz, rate_hz_per_s=rate_hz_per_s or 0.0,
-                progress=line.counted("periods" if to_hz is None else "steps"),
-            )  # fmt: skip
-        hits = impacts(found.motion)
-        write_simulation(found.motion, hits, out, loaded.text, loaded.title, directions_of(loaded))
-    for told in (found.motion, hits, found.spectrum):
-        if told is not None:
-            click.echo(repr(told).strip("<>"))
-    click.echo(f"written to {out}: {written_by(out, 'simulation')}")
+    scene, out = work.scene, work.out
+    found = simulation_of(
+        scene, frequency_hz, periods=periods or 100, transient=transient, exponents=exponents,
+        to_hz=to_hz, rate_hz_per_s=rate_hz_per_s or 0.0,
+        progress=work.line.counted("periods" if to_hz is None else "steps"),
+    )  # fmt: skip
+    hits = impacts(found.motion)
+    write_simulation(found.motion, hits, out, scene.text, scene.title, directions_of(scene))
+    return Told([*_shown(found.motion, hits, found.spectrum), written_by(out, "simulation")])
 
 
 @main.command()
-@scene_argument
-@out_option
-@mesh_option
-@replace_option
+@writes_results()
 @click.option(
     "--frequency-hz",
     type=click.FloatRange(1e-6, 1e12),
@@ -671,13 +610,9 @@ def simulate(
     metavar="N",
     help="Excitation periods after which a motion counts as undecided.",
 )
-@quiet_option
 @jobs_option
 def basins(
-    scene: Path,
-    out: Path,
-    mesh_folders: tuple[Path, ...],
-    replace: bool,
+    work: Work,
     frequency_hz: float,
     x: PlaneState | None,
     y: PlaneState | None,
@@ -685,51 +620,44 @@ def basins(
     y_range: tuple[float, float] | None,
     cells: int,
     longest: int,
-    quiet: bool,
     jobs: int,
-) -> None:
+) -> Told:
     """Find which initial states of a scene lead to which attractor, in a plane of two of them.
 
     All else begins undeformed, at forcing phase zero. Writes attractors.csv, with the share of
     each, basins.csv, each state with the number of its attractor (0 undecided, -1 behind a rigid
     stop), and a picture.
     """
-    with plain_errors():
-        from nldyn.runtime.progress import progress_line
-        from nldyn.scene.messages import unknown_name
-        from nldyn.scene.read import load_scene
+    from nldyn.report.basins import write_basins
+    from nldyn.scene.basins import basins_of
+    from nldyn.scene.messages import unknown_name
 
-        loaded = load_scene(scene, mesh_folders)
-        for option, state in (("'--x'", x), ("'--y'", y)):
-            if state is not None and state[1] not in loaded.interface_names:
-                fault = unknown_name(state[1], loaded.interface_names, "an interface")
-                raise click.BadParameter(fault, param_hint=option)
-        check_results(out, loaded, replace)
-        from nldyn.report.basins import write_basins
-        from nldyn.scene.basins import basins_of
-
-        with progress_line(quiet) as report:
-            found = basins_of(
-                loaded, frequency_hz, x=x, y=y, x_range=x_range, y_range=y_range, cells=cells,
-                longest=longest, progress=report, jobs=jobs,
-            )  # fmt: skip
-        write_basins(found, out, loaded.text, loaded.title)
-    click.echo(f"{repr(found).strip('<>')}\n{found.report()}")
-    click.echo(f"written to {out}: {written_by(out, 'basins')}")
+    scene, out = work.scene, work.out
+    for option, state in (("'--x'", x), ("'--y'", y)):
+        if state is not None and state[1] not in scene.interface_names:
+            fault = unknown_name(state[1], scene.interface_names, "an interface")
+            raise click.BadParameter(fault, param_hint=option)
+    found = basins_of(
+        scene, frequency_hz, x=x, y=y, x_range=x_range, y_range=y_range, cells=cells,
+        longest=longest, progress=work.line, jobs=jobs,
+    )  # fmt: skip
+    write_basins(found, out, scene.text, scene.title)
+    return Told([*_shown(found), found.report(), written_by(out, "basins")])
 
 
-def written_by(out: Path, kind: str) -> str:
-    """The files that a command wrote into a directory of results."""
-    from nldyn.runtime.result_directory import written_files
+def _shown(*found: object) -> list[str]:
+    """What was found, in a line each."""
+    return [repr(each).strip("<>") for each in found if each is not None]
 
-    return ", ".join(written_files(out, kind))
+
+def period_of_an_orbit(period: int, frequency_hz: float | None, **_: Any) -> None:
+    """Refuse a period of no orbit."""
+    if period != 1 and frequency_hz is None:
+        raise click.UsageError("'--period' needs '--frequency-hz'")
 
 
 @main.command()
-@scene_argument
-@out_option
-@mesh_option
-@replace_option
+@writes_results(check=period_of_an_orbit)
 @drawn_modes_option
 @view_option
 @click.option(
@@ -752,73 +680,44 @@ def written_by(out: Path, kind: str) -> str:
     show_default=True,
     help="Kind of animation; mp4 needs imageio-ffmpeg.",
 )
-@quiet_option
 @jobs_option
 def render(
-    scene: Path,
-    out: Path,
-    mesh_folders: tuple[Path, ...],
-    replace: bool,
+    work: Work,
     modes: list[int] | None,
     view: str,
     frequency_hz: float | None,
     period: int,
     video: str,
-    quiet: bool,
     jobs: int,
-) -> None:
+) -> Told:
     """Draw mode shapes, deepest contact and one period in motion of a scene.
 
     All that is of a mesh is drawn; components from matrices have no shape. Writes modes.csv,
     pictures, an animation, and the pages mode_shapes.html and deepest_contact.html for a browser.
     DIR may be that of a run.
     """
-    if period != 1 and frequency_hz is None:
-        raise click.UsageError("'--period' needs '--frequency-hz'")
-    with plain_errors():
-        from nldyn.runtime.progress import progress_line
-        from nldyn.scene.read import load_scene
+    from fem.render import RenderError
+    from nldyn.report.render import render_scene
 
-        loaded = load_scene(scene, mesh_folders)
-        check_results(out, loaded, replace)
-        from fem.render import RenderError
-        from nldyn.report.render import render_scene
-
-        try:
-            with progress_line(quiet) as report:
-                made = render_scene(
-                    loaded,
-                    out,
-                    frequency_hz=frequency_hz,
-                    period=period,
-                    video=video,
-                    modes=modes or (),
-                    view=view,
-                    progress=report,
-                    jobs=jobs,
-                )
-        except RenderError as error:
-            click.echo(f"nldyn: {error}", err=True)
-            sys.exit(NO_GRAPHICS)
-    if made.orbit is None:
-        click.echo("no [continuation], so no orbit is drawn")
-    else:
+    try:
+        made = render_scene(
+            work.scene, work.out, frequency_hz=frequency_hz, period=period, video=video,
+            modes=modes or (), view=view, progress=work.line, jobs=jobs,
+        )  # fmt: skip
+    except RenderError as error:
+        return Told((), str(error), NO_GRAPHICS)
+    drawn = "no [continuation], so no orbit is drawn"
+    if made.orbit is not None:
         orbit = made.orbit
-        click.echo(
+        drawn = (
             f"drawn: the {orbit.stability.verdict} orbit of period {orbit.period} at "
             f"{orbit.frequency_hz:.6g} Hz, with {orbit.impacts} impacts"
         )
-    click.echo(f"written to {out}: {written_by(out, 'render')}")
-    if made.missing:
-        click.echo(f"nldyn: {made.missing}", err=True)
-        sys.exit(NO_GRAPHICS)
+    return Told([drawn, written_by(work.out, "render")], made.missing, NO_GRAPHICS)
 
 
 @main.command()
-@scene_argument
-@out_option
-@mesh_option
-@replace_option
+@writes_results()
 @click.option(
     "--modes",
     callback=number_list,
@@ -852,13 +751,9 @@ def render(
 )
 @click.option("--at-hz", type=click.FloatRange(1e-6, 1e12), metavar="HZ", help="Orbit to compare.")
 @click.option("--full", is_flag=True, help="Find this orbit in the full model, too (minutes).")
-@quiet_option
 @jobs_option
 def converge(
-    scene: Path,
-    out: Path,
-    mesh_folders: tuple[Path, ...],
-    replace: bool,
+    work: Work,
     modes: list[int] | None,
     methods: str,
     refinements: list[int] | None,
@@ -866,51 +761,26 @@ def converge(
     components: str | None,
     at_hz: float | None,
     full: bool,
-    quiet: bool,
     jobs: int,
-) -> None:
+) -> Told:
     """Compute the harmonic branch with more and more modes, and compare.
 
     Also by several methods, or on several meshes.
     """
-    with plain_errors():
-        from nldyn.runtime.progress import progress_line
-        from nldyn.scene.read import load_scene
+    from nldyn.report.convergence import write_study
+    from nldyn.scene.convergence import convergence_study_of
 
-        loaded = load_scene(scene, mesh_folders)
-        check_results(out, loaded, replace)
-        from nldyn.report.convergence import write_study
-        from nldyn.scene.convergence import convergence_study_of
-
-        with progress_line(quiet) as report:
-            study = convergence_study_of(
-                loaded,
-                modes=modes,
-                methods=[name.strip() for name in methods.split(",")],
-                refinements=refinements or [1],
-                meshes=[name.strip() for name in meshes.split(",")] if meshes else (),
-                components=[name.strip() for name in components.split(",")] if components else (),
-                at_hz=at_hz,
-                full=full,
-                progress=report,
-                jobs=jobs,
-            )
-        write_study(study, out, loaded.title, loaded.text)
-        click.echo(study.report())
-        page = out / "convergence.html"
-        click.echo(f"written to {out}; {page} is a page for a browser")
+    scene, out = work.scene, work.out
+    study = convergence_study_of(
+        scene, modes=modes, methods=_names(methods), refinements=refinements or [1],
+        meshes=_names(meshes), components=_names(components), at_hz=at_hz, full=full,
+        progress=work.line, jobs=jobs,
+    )  # fmt: skip
+    write_study(study, out, scene.title, scene.text)
+    page = out / "convergence.html"
+    return Told([study.report(), f"written to {out}; {page} is a page for a browser"])
 
 
-def check_results(out: Path, scene: Scene, replace: bool) -> None:
-    """Refuse a directory that cannot be written, or, unless wanted, with another scene's results.
-
-    Titles and comments do not count.
-    """
-    from nldyn.runtime.result_directory import OutputError, check_directory, says_something_else
-
-    check_directory(out)
-    if not replace and says_something_else(out, scene.text):
-        raise OutputError(
-            f"{out}: holds the results of a scene that says something else; choose another "
-            "directory, or replace them with --replace"
-        )
+def _names(text: str | None) -> list[str]:
+    """Names with commas between them."""
+    return [] if text is None else [name.strip() for name in text.split(",")]

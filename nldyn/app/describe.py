@@ -160,8 +160,8 @@ def echo_parts(parts: Mapping[str, Any]) -> None:
             click.echo(fem.summary(part))
 
 
-def print_json(content: Mapping[str, object]) -> None:
-    """Print JSON on stdout; numbers that are not finite become null."""
+def json_text(content: Mapping[str, object]) -> str:
+    """Content as JSON; numbers that are not finite become null."""
 
     def plain(value: object) -> object:
         if isinstance(value, float):
@@ -170,4 +170,4 @@ def print_json(content: Mapping[str, object]) -> None:
             return {key: plain(each) for key, each in value.items()}
         return [plain(each) for each in value] if isinstance(value, list | tuple) else value
 
-    click.echo(json.dumps(plain(content), indent=1, allow_nan=False))
+    return json.dumps(plain(content), indent=1, allow_nan=False)

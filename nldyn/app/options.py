@@ -37,7 +37,9 @@ mesh_option = click.option(
     help="Folder from which the mesh may come, beside those of the scene and the current one.",
 )
 replace_option = click.option(
-    "--replace", is_flag=True, help="Replace results of another scene in DIR."
+    "--replace",
+    is_flag=True,
+    help="Compute anew, also where DIR holds finished results of this scene or of another one.",
 )
 quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
 jobs_option = click.option(
