@@ -24,7 +24,6 @@ from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.passage import Passage, shoot_past
 from nldyn.orbits.shooting import ShootingProblem
-from nldyn.system.rigid_stop import RigidStop
 
 STEPS = 8  # most of Newton's method
 SMALL = 1e-12  # its last step, relative to the orbit
@@ -159,12 +158,9 @@ class Touches:
 
     def losses(self, speeds: Real) -> Real:
         """1 + e (m,) at speeds (m,)."""
-        stops = [self.problem.flow.system.stops[stop] for stop in self.stops]
-        return np.array([
-            1.0 + stop.restitution_at(speed)
-            for stop, speed in zip(stops, speeds.tolist(), strict=True)
-            if isinstance(stop, RigidStop)
-        ])  # fmt: skip
+        rigid = self.problem.flow.system.rigid_stops
+        hits = zip(self.stops, speeds.tolist(), strict=True)
+        return np.array([1.0 + rigid[stop].restitution_at(speed) for stop, speed in hits])
 
     def after(self, speeds: Real) -> Real:
         """States (m, 2n) behind impacts of these speeds."""

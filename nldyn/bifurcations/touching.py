@@ -14,7 +14,6 @@ from nldyn.bifurcations.point import BranchNode
 from nldyn.orbits.bordered import length_unit
 from nldyn.orbits.extremes import alone, nearest, sign_changes
 from nldyn.orbits.orbit import Extremes, Orbit
-from nldyn.system.rigid_stop import RigidStop, touched_sharply
 from nldyn.system.system import System
 
 EXACT = 1e-9  # of an orbit's size: depth of a touch that is solved for
@@ -93,8 +92,7 @@ def rigid_touches(orbit: Orbit) -> list[tuple[int, float, float]]:
     """Rigid stop, phase and depth (in m) of all impacts and near misses."""
     return [
         (stop, float(phase), float(depth))
-        for stop, each in enumerate(orbit.system.stops)
-        if isinstance(each, RigidStop)
+        for stop in orbit.system.rigid_stops
         for phase, depth in zip(*_maxima(orbit.touches(stop)), strict=True)
     ]
 
@@ -110,5 +108,5 @@ def _maxima(found: Extremes) -> tuple[Real, Real]:
 
 
 def touches_sharply(system: System) -> bool:
-    """Whether there is a stop that is touched sharply, see `touched_sharply`."""
-    return any(map(touched_sharply, system.stops))
+    """Whether there is a stop that is touched sharply, see `Stop.sharp`."""
+    return any(stop.sharp for stop in system.stops)

@@ -237,7 +237,7 @@ def _check_conservative(system: System) -> None:
         )
     if np.any(system.total_damping):
         raise SystemModelError("backbones are not followed with gyroscopic matrices")
-    if len(system.elastic_stops) < len(system.stops):
+    if system.rigid_stops:
         raise SystemModelError(
             "backbones are not followed against rigid stops: give the stop a high stiffness"
         )

@@ -24,7 +24,6 @@ from nldyn.orbits.conditions import Both, Grazing, Singular
 from nldyn.orbits.extremes import nearest
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import metric_length
-from nldyn.system.rigid_stop import is_linear
 
 MEETING = 1e-9  # arclength within which a curve and a grazing meet
 MOST_SECANTS = 20
@@ -46,7 +45,7 @@ def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePo
     try:
         grazing = Grazing.of(here.orbit)
         family = here.found.at.family
-        linear = is_linear(here.orbit.system.stops[grazing.stop])
+        linear = here.orbit.system.stops[grazing.stop].is_linear
         if linear:
             found = _meeting(here.found.at, here.condition, grazing, 10.0 * CORNER_STEP)
         else:
@@ -153,7 +152,7 @@ def extremes_meet(here: CurvePoint) -> bool:
 def grazes_linear(orbit: Orbit) -> bool:
     """Whether the extreme nearest to zero is one of a linear stop."""
     try:
-        return is_linear(orbit.system.stops[Grazing.of(orbit).stop])
+        return orbit.system.stops[Grazing.of(orbit).stop].is_linear
     except SystemModelError:
         return False
 

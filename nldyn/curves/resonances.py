@@ -92,7 +92,7 @@ def phase_resonance(
     source, index = driving_source(flow.system)
     if source.harmonic != 1:
         raise SystemModelError("phase resonance needs a source of harmonic 1")
-    if len(flow.system.elastic_stops) < len(flow.system.stops):
+    if flow.system.rigid_stops:
         raise SystemModelError(
             "phase resonance is not followed against rigid stops: give one a high stiffness"
         )

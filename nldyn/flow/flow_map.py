@@ -54,7 +54,6 @@ from nldyn.system.contact_law import law_address
 from nldyn.system.linear import ForcedResponse
 from nldyn.system.parameters import Parameter
 from nldyn.system.ride import NO_RIDE, Ride
-from nldyn.system.stop import Stop
 from nldyn.system.system import Clock, System, same_system
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
@@ -236,11 +235,11 @@ class FlowMap:
     @cached_property
     def tables(self) -> GaussTables:
         """Collocation tables."""
-        exponents = [stop.exponent for stop in self.system.elastic_stops]
+        exponents = [stop.exponent for stop in self.system.elastic_stops.values()]
         smooth = all(float(2.0 * exponent).is_integer() for exponent in exponents)
         power = 2 if smooth else 4
         nodes, tail = self.options.panel_nodes, self.options.panel_tail
-        for stop in self.system.elastic_stops:
+        for stop in self.system.elastic_stops.values():
             viscous = stop.dissipation != 0.0 or stop.dashpot != 0.0
             nodes = _nodes_for_switch(stop.exponent, power, viscous, nodes, tail)
         return gauss_tables(nodes, power)
@@ -254,9 +253,10 @@ class FlowMap:
         s = self.system
         vectors = [*self._pushed, *s.participation.values()]
         rows = [s.displacement_row(v) for v in vectors]
-        for stop, row in zip(s.stops, rows[: len(s.stops)], strict=True):
-            if isinstance(stop, Stop) and not stop.pulls:
-                rows.append(row + stop.dashpot / stop.stiffness * s.linear.times_block(row))
+        for i, stop in s.elastic_stops.items():
+            if not stop.pulls:
+                slowing = stop.dashpot / stop.stiffness
+                rows.append(rows[i] + slowing * s.linear.times_block(rows[i]))
         return np.array(rows).reshape(len(rows), 2 * s.size)
 
     @cached_property

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.flow.flow_map import FlowMap, Trajectory
-from nldyn.system.rigid_stop import RigidStop
-from nldyn.system.stop import Stop
 
 SHUT = 1e-13  # of the displacements that add up to that at a stop: a gap counts as closed
 BEHIND = 1e-9  # of them: depth of a state that lies behind a rigid stop
@@ -44,18 +42,19 @@ class RigidImpacts(NamedTuple):
 def behind_rigid_stops(flow: FlowMap, states: Real) -> NDArray[np.bool_]:
     """Which of the states z (k, 2n) lie behind a rigid stop, where no motion can begin."""
     behind = np.zeros(len(states), dtype=bool)
-    for row, stop in zip(flow.rows, flow.system.stops, strict=False):
-        if isinstance(stop, RigidStop):
-            size = np.abs(states) @ np.abs(row) + stop.gap
-            behind |= states @ row - stop.gap > BEHIND * size
+    for i, stop in flow.system.rigid_stops.items():
+        row = flow.rows[i]
+        size = np.abs(states) @ np.abs(row) + stop.gap
+        behind |= states @ row - stop.gap > BEHIND * size
     return behind
 
 
 def before_rigid_stops(flow: FlowMap, states: Real) -> Real:
     """States z (k, 2n), those behind rigid stops mirrored at them, or moved to the middle."""
     states = states.copy()
-    rigid = [i for i, stop in enumerate(flow.system.stops) if isinstance(stop, RigidStop)]
-    for row, stop in zip(flow.rows[rigid], [flow.system.stops[i] for i in rigid], strict=True):
+    rigid = list(flow.system.rigid_stops)
+    for i, stop in flow.system.rigid_stops.items():
+        row = flow.rows[i]
         depth = np.maximum(states @ row - stop.gap, 0.0)
         states -= 2.0 * depth[:, None] * row / (row @ row)
     behind = behind_rigid_stops(flow, states)
@@ -79,8 +78,7 @@ def rigid_impacts(motion: Trajectory, stop: int) -> RigidImpacts:
     Those that end in rest, ever faster, are told as far as the flow map follows them.
     """
     flow, rec = motion.flow, motion.record
-    rigid = [isinstance(each, RigidStop) for each in flow.system.stops]
-    after = 1 + np.flatnonzero(np.isin(rec.event[:-1], np.flatnonzero(rigid)))
+    after = 1 + np.flatnonzero(np.isin(rec.event[:-1], list(flow.system.rigid_stops)))
     if not after.size:
         return RigidImpacts(after, *np.empty((3, 0)))
     before = states_before(motion, after)
@@ -99,9 +97,8 @@ def rigid_impacts(motion: Trajectory, stop: int) -> RigidImpacts:
 def impacts_in_order(motion: Trajectory) -> list[tuple[int, float]]:
     """Rigid stop and speed of every impact, also of those that follow within one instant."""
     flow, system = motion.flow, motion.flow.system
-    found = [rigid_impacts(motion, stop) if isinstance(each, RigidStop) else None
-             for stop, each in enumerate(system.stops)]  # fmt: skip
-    hits = [(int(piece), stop, float(speed)) for stop, hit in enumerate(found) if hit is not None
+    found = {stop: rigid_impacts(motion, stop) for stop in system.rigid_stops}
+    hits = [(int(piece), stop, float(speed)) for stop, hit in found.items()
             for piece, speed in zip(hit.piece, hit.speed, strict=True)]  # fmt: skip
     several = {piece for piece, *_ in hits if sum(other == piece for other, *_ in hits) > 1}
     listed = [(stop, speed) for piece, stop, speed in hits if piece not in several]
@@ -116,9 +113,8 @@ def impacts_in_order(motion: Trajectory) -> list[tuple[int, float]]:
             if speed <= STILL * np.abs(speeds[shut]).max():
                 break
             listed.append((hit, speed))
-            rigid = system.stops[hit]
-            assert isinstance(rigid, RigidStop)
-            kick = (1.0 + rigid.restitution_at(speed)) * speed / mobility[hit, hit]
+            kick = (1.0 + system.rigid_stops[hit].restitution_at(speed)) * speed
+            kick /= mobility[hit, hit]
             speeds = speeds - mobility[:, hit] * kick
     return listed
 
@@ -166,8 +162,7 @@ def series_to_rest(motion: Trajectory, stop: int, hits: RigidImpacts) -> Series:
 
 def rests_on_rigid_stop(motion: Trajectory) -> bool:
     """Whether a body rests on a rigid stop for a while in a motion."""
-    stops = motion.flow.system.stops
-    rigid = [i for i, stop in enumerate(stops) if isinstance(stop, RigidStop)]
+    rigid = list(motion.flow.system.rigid_stops)
     return bool(rigid) and bool(motion.record.depth[:, rigid].any())
 
 
@@ -180,17 +175,16 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
     flow, rec, omega = motion.flow, motion.record, motion.omega
     system, data = flow.system, flow._data
     forces = np.zeros((len(phases), len(system.stops)))
-    rigid = np.flatnonzero([isinstance(stop, RigidStop) for stop in system.stops])
+    rigid = np.array(list(system.rigid_stops), dtype=np.intp)
     piece = np.clip(np.searchsorted(rec.phase, phases, side="right") - 1, 0, None)
     rests = np.any(rec.depth[:, rigid] != 0.0, axis=2)[piece]
     if not rests.any():
         return forces
     turns = np.exp(1j * phases[:, None] * data.orders)
     rates = (turns @ (np.array([1.0, omega, omega * omega]) @ data.drive)).real
-    for i, stop in enumerate(system.stops):
-        if isinstance(stop, Stop):
-            pushed = stop.force(states @ flow.rows[i] - stop.gap, states @ flow.rate_rows[i])
-            rates -= pushed[:, None] * data.force[:, i]
+    for i, stop in system.elastic_stops.items():
+        pushed = stop.force(states @ flow.rows[i] - stop.gap, states @ flow.rate_rows[i])
+        rates -= pushed[:, None] * data.force[:, i]
     for i, bond in enumerate(system.bonds, len(system.stops)):
         pulled = bond.force(states @ flow.rows[i], states @ flow.rate_rows[i])
         rates -= pulled[:, None] * data.force[:, i]

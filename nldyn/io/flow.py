@@ -39,15 +39,9 @@ Laws = Mapping[int, Callable[..., Any]]  # of elastic stops, restitutions of rig
 
 def laws_of(system: System) -> Laws:
     """Contact laws of a system's own, by the numbers of their stops."""
-    rigid = {
-        i: stop.restitution
-        for i, stop in enumerate(system.stops)
-        if isinstance(stop, RigidStop) and callable(stop.restitution)
-    }
-    return {
-        **{i: s.law for i, s in enumerate(system.stops) if isinstance(s, Stop) and s.law},
-        **rigid,
-    }
+    own = {i: stop.law for i, stop in system.elastic_stops.items() if stop.law}
+    rigid = {i: s.restitution for i, s in system.rigid_stops.items() if callable(s.restitution)}
+    return {**own, **rigid}
 
 
 def checked_laws(laws: Laws | None) -> Laws:
@@ -84,7 +78,7 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     _write_interfaces(group, system)
     _write_basis(group, system)
     _write_rigid_stops(group, system)
-    _write_elastic_stops(group, system.elastic_stops)
+    _write_elastic_stops(group, tuple(system.elastic_stops.values()))
     _write_columns(
         group.create_group("dampers"),
         {"at": [d.at for d in system.dampers], **_ends(system.dampers), **_drags(system.dampers)},
@@ -192,15 +186,15 @@ def _coefficients(spring: AnySpring) -> list[float]:
 
 def _write_rigid_stops(group: Any, system: System) -> None:
     """Write the rigid stops, if there are some, with their places among all."""
-    placed = [(i, s) for i, s in enumerate(system.stops) if isinstance(s, RigidStop)]
+    placed = system.rigid_stops
     if not placed:
         return
-    stops = [stop for _, stop in placed]
+    stops = list(placed.values())
     _write_columns(
         group.create_group("rigid_stops"),
         {"at": [s.at for s in stops], "against": [s.against or "" for s in stops]},
         {
-            "place": ("1", [i for i, _ in placed]),
+            "place": ("1", list(placed)),
             "gap": ("m", [s.gap for s in stops]),
             "direction": ("1", [s.direction for s in stops]),
             "is_against": ("1", [s.against is not None for s in stops]),

@@ -17,7 +17,6 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.rigid import rigid_impacts
 from nldyn.longterm.simulation import Motion, end_state, motion_of
 from nldyn.orbits.orbit import Orbit
-from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.system import System
 
 if TYPE_CHECKING:
@@ -302,7 +301,7 @@ def _peaks(values: Real) -> Real:
 
 def _of_stop(motion: Motion, pieces: _Pieces, stop: int) -> dict[str, NDArray[Any]]:
     """Columns of the complete contacts with one stop."""
-    if isinstance(motion.flow.system.stops[stop], RigidStop):
+    if motion.flow.system.stops[stop].impulsive:
         return _of_rigid_stop(motion, stop)
     first, last, panels, group = contact_runs(pieces.depth[:, stop], pieces.event, stop)
     table = _panel_table(motion, pieces, stop, panels)

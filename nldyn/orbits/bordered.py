@@ -33,7 +33,6 @@ from nldyn.system.chart import (
     with_value,
 )
 from nldyn.system.parameters import Parameter
-from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.system import System
 
 # A central difference of a function g with the error ε errs by ε/h + h² g(3)/6. Monodromy matrices
@@ -382,8 +381,7 @@ class Evaluation:
 
         A motion past a grazing is smooth.
         """
-        rigid = any(isinstance(stop, RigidStop) for stop in self.family.system.stops)
-        if not rigid or self.family.passages:
+        if not self.family.system.rigid_stops or self.family.passages:
             return END_DIFFERENCE
         way = OF_SQUARE * nearest_depth(self.orbit) ** 2
         return min(max(way, LEAST_END_DIFFERENCE), END_DIFFERENCE)

@@ -29,8 +29,6 @@ from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.passage import Passage, peak_past
 from nldyn.orbits.shooting import metric_length
 from nldyn.system.loads import BaseMotion, ConstantForce, HarmonicForce, Unbalance
-from nldyn.system.rigid_stop import RigidStop, touched_sharply
-from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 KINDS = ("LP", "PD", "NS", "BP", "GR")
@@ -241,7 +239,7 @@ class Grazing:
         best, shortest = None, FARTHEST * unit
         for stop in range(len(orbit.system.stops)):
             found = orbit.touches(stop)
-            rigid = isinstance(orbit.system.stops[stop], RigidStop)
+            rigid = orbit.system.stops[stop].impulsive
             for phase, depth, kind in zip(
                 found.phases, found.values, found.is_maximum, strict=True
             ):
@@ -254,7 +252,7 @@ class Grazing:
 
     def _beside(self, orbit: Orbit) -> Grazing:
         """The same with the width of the passage of a rigid stop."""
-        if not isinstance(orbit.system.stops[self.stop], RigidStop):
+        if not orbit.system.stops[self.stop].impulsive:
             return self
         full, found = 2.0 * math.pi * orbit.period, orbit.touches(self.stop)
         apart = np.abs((found.phases - self.phase + 0.5 * full) % full - 0.5 * full)
@@ -271,10 +269,10 @@ class Grazing:
         if not self.half:
             return self
         let_past = [Passage(self.stop, self.phase, self.half, self.every)]
-        for stop, each in enumerate(orbit.system.stops):
+        for stop in orbit.system.rigid_stops:
             found = orbit.touches(stop)
             slight = found.is_maximum & (np.abs(found.values) < ALL_GRAZE * self.unit)
-            for phase in found.phases[slight & isinstance(each, RigidStop)].tolist():
+            for phase in found.phases[slight].tolist():
                 if not any(one.stop == stop and one.holds(phase) for one in let_past):
                     other = Grazing(stop, True, phase, self.unit)._beside(orbit)
                     let_past.append(Passage(stop, phase, other.half, other.every))
@@ -310,7 +308,7 @@ class Grazing:
         with its root, and so would show the rounding of d = 0; those of a contact that does not
         quite begin, or split, do not. An impact with a rigid stop does not quite happen either.
         """
-        sharp = touched_sharply(at.family.system.stops[self.stop])
+        sharp = at.family.system.stops[self.stop].sharp
         clear = (CLEAR if self.is_maximum else -CLEAR) if sharp else 0.0
         return np.array([self._reached(at)[1] / self.unit - self.depth + clear])
 
@@ -453,7 +451,7 @@ def peak_force(orbit: Orbit) -> float:
     Where a force depends on the speed, it is that of the recorded motion.
     """
     stops = orbit.system.elastic_stops
-    if len(stops) < len(orbit.system.stops) or any(stop.depends_on_speed for stop in stops):
+    if orbit.system.rigid_stops or any(stop.depends_on_speed for stop in stops.values()):
         return max(
             (math.inf if hit.force is None else hit.force for hit in orbit.impact_list), default=0.0
         )
@@ -510,7 +508,7 @@ def _depths(orbit: Orbit) -> list[tuple[int, float]]:
     """Each stop with the depth of its deepest penetration."""
     found = []
     for index, peaks in enumerate(orbit.penetration_peaks):
-        if peaks.values.size and isinstance(orbit.system.stops[index], Stop):
+        if peaks.values.size and index in orbit.system.elastic_stops:
             phase = float(peaks.phases[int(np.argmax(peaks.values))])
             depth = exact_output(orbit, index, phase) - orbit.system.stops[index].gap
             found.append((index, depth))
@@ -521,12 +519,11 @@ def _extremes_of(monitor: Callable[[Orbit], float], orbit: Orbit) -> list[float]
     """What a monitor of this module is the largest of, from the recorded motion."""
     if monitor is max_abs_displacement:
         return [float(x) for x in np.abs(orbit.observed_extremes.values)]
-    peaks = zip(orbit.system.stops, orbit.penetration_peaks, strict=True)
+    peaks = orbit.penetration_peaks
     depths = [
         (stop, float(depth))
-        for stop, found in peaks
-        if isinstance(stop, Stop)
-        for depth in found.values
+        for index, stop in orbit.system.elastic_stops.items()
+        for depth in peaks[index].values
     ]
     if monitor is max_penetration:
         return [depth for _, depth in depths]

@@ -127,7 +127,7 @@ def line_by_balance(orbit: Orbit, interface: str, order: int) -> complex:
         If the system has rigid stops, or an undamped mode of this very frequency.
     """
     system, flow, omega = orbit.system, orbit.problem.flow, orbit.omega
-    if len(system.elastic_stops) < len(system.stops):
+    if system.rigid_stops:
         raise SystemModelError("the forces of rigid stops have no balance by harmonics")
     phases, weights = orbit.trajectory.contact_quadrature()
     record = orbit.trajectory.record

@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.flow.rigid import rigid_impacts, series_to_rest
 from nldyn.orbits.orbit import Orbit
-from nldyn.system.rigid_stop import RigidStop
 
 STARTS = 32  # first phases of shooting among which the one farthest from all impacts is chosen
 
 
 def _impact_phases(orbit: Orbit) -> Real:
     """Phases of all impacts with rigid stops."""
-    stops = [i for i, stop in enumerate(orbit.system.stops) if isinstance(stop, RigidStop)]
-    phases = [rigid_impacts(orbit.trajectory, stop).phase for stop in stops]
+    phases = [rigid_impacts(orbit.trajectory, stop).phase for stop in orbit.system.rigid_stops]
     return np.concatenate(phases) if phases else np.empty(0)
 
 
@@ -50,14 +48,13 @@ def impacts_by_segment(orbit: Orbit) -> NDArray[np.intp]:
     """
     problem, motion = orbit.problem, orbit.trajectory
     count = np.zeros(problem.segments, dtype=np.intp)
-    for index, stop in enumerate(orbit.system.stops):
-        if isinstance(stop, RigidStop):
-            hits = rigid_impacts(motion, index)
-            segment = np.searchsorted(problem.phases, hits.phase, side="right") - 1
-            segment = np.clip(segment, 0, problem.segments - 1)
-            follows = series_to_rest(motion, index, hits).follows
-            endless = follows & (segment == _last_of_series(segment, follows))
-            count += np.bincount(segment[~endless], minlength=problem.segments)
+    for index in orbit.system.rigid_stops:
+        hits = rigid_impacts(motion, index)
+        segment = np.searchsorted(problem.phases, hits.phase, side="right") - 1
+        segment = np.clip(segment, 0, problem.segments - 1)
+        follows = series_to_rest(motion, index, hits).follows
+        endless = follows & (segment == _last_of_series(segment, follows))
+        count += np.bincount(segment[~endless], minlength=problem.segments)
     return count
 
 

@@ -34,8 +34,7 @@ from nldyn.orbits.multipliers import (
     uncertainties,
 )
 from nldyn.orbits.shooting import ShootingProblem
-from nldyn.system.rigid_stop import AnyStop, RigidStop
-from nldyn.system.stop import Stop
+from nldyn.system.rigid_stop import AnyStop
 from nldyn.system.system import System
 
 SAME_PHASE = 1e-9  # in rad: an extreme and an impact
@@ -357,7 +356,7 @@ class Orbit:
         stops = self.system.stops
         offset = stops[output].gap if output < len(stops) else 0.0
         phases, values, kinds = found[:, 0], found[:, 1] - offset, found[:, 2] > 0.0
-        if output < len(stops) and isinstance(stops[output], RigidStop):
+        if output in self.system.rigid_stops:
             values, hit = self._beyond_rigid_stop(output, phases, values)
             free = np.where(hit, ~self._settles(output, phases), ~self._rests(output, phases))
             phases, values, kinds = phases[free], values[free], kinds[free]
@@ -424,8 +423,7 @@ class Orbit:
         """Deepest penetration over all stops in m (zero if none is touched)."""
         heights = (
             self._highest(index, lambda found: np.where(found.is_maximum, found.values, 0.0))
-            for index, stop in enumerate(self.system.stops)
-            if not isinstance(stop, RigidStop)
+            for index in self.system.elastic_stops
         )
         return max(heights, default=0.0)
 
@@ -450,7 +448,7 @@ class Orbit:
             return int(self.trajectory.closings.sum())
         count = 0
         for index, stop in enumerate(self.system.stops):
-            if isinstance(stop, RigidStop):
+            if stop.impulsive:
                 hits = rigid_impacts(self.trajectory, index)
                 count += int(np.sum(~series_to_rest(self.trajectory, index, hits).follows))
             else:
@@ -470,7 +468,7 @@ class Orbit:
         """
         found = []
         for index, stop in enumerate(self.system.stops):
-            of_stop = self._rigid_list if isinstance(stop, RigidStop) else self._elastic_list
+            of_stop = self._rigid_list if stop.impulsive else self._elastic_list
             found += of_stop(index)
         return tuple(sorted(found, key=lambda impact: impact.time))
 
@@ -497,8 +495,7 @@ class Orbit:
 
     def _largest_force(self, index: int, phase: float, depth: float) -> float:
         """Largest force of the contact whose penetration is deepest at a phase."""
-        stop = self.system.stops[index]
-        assert not isinstance(stop, RigidStop)
+        stop = self.system.elastic_stops[index]
         if not stop.depends_on_speed:
             return float(stop.force(depth))
 
@@ -585,8 +582,8 @@ def history_of(
     force = rest.T.copy()
     for row, stop in enumerate(system.stops):
         depth[row], speed = _depth_and_speed(system, stop, states)
-        if isinstance(stop, Stop):
-            force[row] = stop.force(depth[row], speed)
+        if row in system.elastic_stops:
+            force[row] = system.elastic_stops[row].force(depth[row], speed)
     return History(
         time,
         q,
@@ -623,7 +620,7 @@ def contact_damping(flow: FlowMap, motion: Trajectory) -> float:
     phases, weights = motion.contact_quadrature()
     states = flow.to_modal(motion.states(phases))
     total = contraction
-    for stop in system.elastic_stops:
+    for stop in system.elastic_stops.values():
         v = system.stop_vector(stop)
         total += float(v @ v * weights @ stop.viscosity(*_depth_and_speed(system, stop, states)))
     for bond in system.bonds:
@@ -639,8 +636,7 @@ def impact_contraction(motion: Trajectory) -> float:
         return math.inf
     total = 0.0
     for index, speed in impacts_in_order(motion):
-        stop = motion.flow.system.stops[index]
-        factor = stop.determinant(speed) if isinstance(stop, RigidStop) else 1.0
+        factor = motion.flow.system.rigid_stops[index].determinant(speed)
         total += -math.log(factor) if factor > 0.0 else math.inf
     return total
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from nldyn.plot.diagram import axis_unit, branch_curve, stability_runs
 from nldyn.plot.words import is_angle, units_of
 from nldyn.system.naming import stop_name
-from nldyn.system.rigid_stop import RigidStop
 
 if TYPE_CHECKING:
     from nldyn.branches.branch import Branch
@@ -81,7 +80,7 @@ def _contact_lines(orbits: Sequence[Orbit], direction_of: Directions) -> list[st
         return ["largest contact force: none, no stop is touched"]
     kinds: dict[tuple[bool, bool], list[int]] = {}
     for number, stop in enumerate(stops):
-        kind = isinstance(stop, RigidStop), is_angle(direction_of(stop.at))
+        kind = stop.impulsive, is_angle(direction_of(stop.at))
         kinds.setdefault(kind, []).append(number)
     return [_contact_line(orbits, among, *kind) for kind, among in sorted(kinds.items())]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -213,7 +213,7 @@ def _settled(system: System, q: Real) -> Real:
 
 def with_springs_for_rigid_stops(system: System) -> System:
     """The system with a stiff linear stop in the place of each rigid one."""
-    if len(system.elastic_stops) == len(system.stops):
+    if not system.rigid_stops:
         return system
     push = float(np.linalg.norm(constant_force(system)))
     stops: list[Stop] = []
@@ -258,7 +258,7 @@ def _downhill(system: System, q: Real, slope: Real) -> Real:
     if force <= NOT_HELD * np.linalg.norm(slope):
         return _newton_step(system, stiffness, slope)
     ways = []
-    for stop in system.elastic_stops:
+    for stop in system.elastic_stops.values():
         c = system.stop_vector(stop)
         pace, left = float(c @ free) / force, stop.gap - float(c @ q)
         if pace > NOT_HELD * np.linalg.norm(c) and left >= 0.0:
@@ -289,7 +289,7 @@ def closed_at_rest(system: System, q: Real) -> list[tuple[int, float, float]]:
     """Number, penetration in m and force in N of each stop that is closed at rest."""
     springs = with_springs_for_rigid_stops(system).elastic_stops
     return [
-        (i, 0.0 if isinstance(system.stops[i], RigidStop) else depth, float(stop.force(depth)))
+        (i, 0.0 if system.stops[i].impulsive else depth, float(stop.force(depth)))
         for i, stop, _, depth in _closed(springs, system, q)
     ]
 
@@ -334,10 +334,10 @@ def _vector(system: System, bond: Bond) -> Real:
 
 
 def _closed(
-    stops: tuple[Stop, ...], system: System, q: Real
+    stops: Mapping[int, Stop], system: System, q: Real
 ) -> Iterator[tuple[int, Stop, Real, float]]:
     """Those of some stops that are closed at modal displacements q: vectors and penetrations."""
-    for i, stop in enumerate(stops):
+    for i, stop in stops.items():
         c = system.stop_vector(stop)
         depth = float(c @ q) - stop.gap
         if depth > 0.0:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.system.loads import Excitation
-from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.springs_dampers import LARGEST_DEGREE, PolynomialSpring
 from nldyn.system.system import System
 
@@ -81,7 +80,7 @@ def check_exact(system: System, parameter: Parameter) -> None:
         check_index(parameter, "stop", len(system.stops))
         stop = system.stops[index]
         if not hasattr(stop, name):
-            kind = "rigid" if isinstance(stop, RigidStop) else "elastic"
+            kind = "rigid" if stop.impulsive else "elastic"
             raise SystemModelError(f"parameter '{name}': stops[{index}] is {kind}, without {name}")
         if name != "gap" and stop.law is not None:
             raise SystemModelError(

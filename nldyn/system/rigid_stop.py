@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import ClassVar
 
 from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.system.contact_law import ContactLaw, numba_for
@@ -13,7 +14,6 @@ from nldyn.system.values import check_sides
 
 Restitution = Callable[[float], tuple[float, float]]
 TRIED_SPEEDS = tuple(10.0**k for k in range(-12, 4))  # m/s
-SMOOTH_TOUCH = 1.5  # exponent of a stop from which on multipliers have a slope at a touch
 STEP, WRONG_SLOPE, DIGITS = 1e-5, 1e-3, 1e-10  # of the differences that check a law's derivative
 
 
@@ -64,6 +64,10 @@ class RigidStop:
     gap: float = 0.0
     direction: int = 1
     against: str | None = None
+    impulsive: ClassVar[bool] = True
+    sharp: ClassVar[bool] = True
+    jumps: ClassVar[bool] = True
+    is_linear: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         check_types(**{"stop: at": (self.at, str), "stop: against": (self.against, str, None)})
@@ -117,16 +121,6 @@ class RigidStop:
 
 
 AnyStop = Stop | RigidStop
-
-
-def touched_sharply(stop: AnyStop) -> bool:
-    """Whether a stop is so stiff from the first touch that multipliers have no slope there."""
-    return isinstance(stop, RigidStop) or stop.exponent < SMOOTH_TOUCH
-
-
-def is_linear(stop: AnyStop) -> bool:
-    """Whether a stop is a one-sided linear spring."""
-    return isinstance(stop, Stop) and stop.exponent == 1.0
 
 
 def _check_restitution(owner: str, restitution: Restitution, speed: float) -> None:

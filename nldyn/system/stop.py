@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,7 @@ from nldyn.system.contact_law import ContactLaw, check_law, power_law
 from nldyn.system.values import check_finite, check_positive, check_sides
 
 LARGEST_EXPONENT = 4.0
+SMOOTH_TOUCH = 1.5  # exponent from which on multipliers have a slope at a touch
 NO_LOSS = 1e-5  # 1 - restitution up to which two terms of the dissipation's series tell all digits
 SERIES = 0.1  # argument up to which y - ln(1 + y) is its series
 DIGITS = 1e-14  # relative error of a root
@@ -274,6 +276,7 @@ class Stop:
     law: ContactLaw | None = None
     dashpot: float = 0.0
     pulls: bool = True
+    impulsive: ClassVar[bool] = False  # whether velocities jump where it is hit
 
     def __post_init__(self) -> None:
         check_types(**{"stop: at": (self.at, str), "stop: against": (self.against, str, None)})
@@ -308,6 +311,21 @@ class Stop:
             )
         check_finite(owner, "gap", self.gap)
         check_sides(owner, self.at, self.against, self.direction)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether it is a one-sided linear spring."""
+        return self.exponent == 1.0
+
+    @property
+    def sharp(self) -> bool:
+        """Whether it is so stiff from the first touch that multipliers have no slope there."""
+        return self.exponent < SMOOTH_TOUCH
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the force jumps where it is hit."""
+        return self.dashpot != 0.0
 
     @property
     def depends_on_speed(self) -> bool:

@@ -467,7 +467,7 @@ class System:
     @property
     def jumps(self) -> bool:
         """Whether a force or a velocity jumps where a stop is hit."""
-        return any(isinstance(s, RigidStop) or s.dashpot != 0.0 for s in self.stops)
+        return any(stop.jumps for stop in self.stops)
 
     @cached_property
     def symmetric(self) -> bool:
@@ -489,10 +489,15 @@ class System:
             )
         )
 
-    @property
-    def elastic_stops(self) -> tuple[Stop, ...]:
-        """The stops that are not rigid."""
-        return tuple(stop for stop in self.stops if isinstance(stop, Stop))
+    @cached_property
+    def elastic_stops(self) -> dict[int, Stop]:
+        """The stops that give way, by their places among all."""
+        return {i: stop for i, stop in enumerate(self.stops) if isinstance(stop, Stop)}
+
+    @cached_property
+    def rigid_stops(self) -> dict[int, RigidStop]:
+        """The stops at which velocities jump, by their places among all."""
+        return {i: stop for i, stop in enumerate(self.stops) if isinstance(stop, RigidStop)}
 
     @cached_property
     def linear(self) -> LinearPart:
@@ -504,7 +509,7 @@ class System:
             D = without_rounding(modes.T @ D @ modes)
             cross = None if cross is None else modes.T @ cross @ modes
         squares = np.zeros(self.size)
-        for stop in self.elastic_stops:
+        for stop in self.elastic_stops.values():
             if stop.exponent == 1.0 or stop.gap < 0.0:
                 preload = max(-stop.gap, 0.0) ** (stop.exponent - 1.0)
                 slope = stop.exponent * stop.stiffness * preload

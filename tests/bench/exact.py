@@ -72,7 +72,7 @@ class ExactFlow:
 
     def __init__(self, system: System, omega: Number, precision: Precision) -> None:
         mp.dps = precision.digits
-        (stop,), (source,) = system.elastic_stops, system.excitation
+        (stop,), (source,) = system.elastic_stops.values(), system.excitation
         assert isinstance(source, HarmonicForce | Unbalance) and source.harmonic == 1
         assert stop.exponent == 1.5 and not stop.depends_on_speed and source.phase_deg == 0.0
         self.precision = precision

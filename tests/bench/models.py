@@ -117,7 +117,7 @@ def to_system(table: dict[str, Any]) -> System:
 
 def to_table(system: System) -> dict[str, Any]:
     """What `to_system` needs to make a system again, to the last bit."""
-    (stop,), (source,) = system.elastic_stops, system.excitation
+    (stop,), (source,) = system.elastic_stops.values(), system.excitation
     assert isinstance(source, Unbalance)
     return {
         "natural_frequencies": system.natural_frequencies.tolist(),

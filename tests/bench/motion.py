@@ -26,7 +26,7 @@ HEAD = 6  # n, ω, size, k, gap, mode
 
 def pack_parameters(system: System, start: Real, omega: float) -> Real:
     """All numbers of the equations in one vector, as `rate` wants them."""
-    (stop,), (source,) = system.elastic_stops, system.excitation
+    (stop,), (source,) = system.elastic_stops.values(), system.excitation
     assert stop.exponent == 1.5 and isinstance(source, Unbalance)
     frequencies = system.natural_frequencies
     n = system.size

@@ -33,7 +33,7 @@ class TaylorPeriod:
 
     def __init__(self, case: Case, tolerance: float) -> None:
         system = case.system
-        (self.stop,), (source,) = system.elastic_stops, system.excitation
+        (self.stop,), (source,) = system.elastic_stops.values(), system.excitation
         assert isinstance(source, Unbalance)
         self.n = n = system.size
         self.frequency = system.natural_frequencies

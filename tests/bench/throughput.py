@@ -109,7 +109,7 @@ def fixed_steps(start, numbers, steps):
 
 def pack(system: System, omega: float) -> Real:
     """All numbers of the equations in one vector, as `plain_rate` wants them."""
-    (stop,), (source,) = system.elastic_stops, system.excitation
+    (stop,), (source,) = system.elastic_stops.values(), system.excitation
     load = source.phasor.real * omega**source.power * system.participation[source.at]
     head = [float(system.size), omega, stop.stiffness, stop.gap]
     return np.concatenate(

@@ -78,7 +78,7 @@ def energy(system: System, modal: Real) -> float:
     """Energy of modal displacements and velocities (2n,), with that of the stops."""
     q, v = modal[: system.size], modal[system.size :]
     total = 0.5 * float(v @ v) + 0.5 * float(np.sum((system.natural_frequencies * q) ** 2))
-    for stop in system.elastic_stops:
+    for stop in system.elastic_stops.values():
         depth = max(float(system.stop_vector(stop) @ q) - stop.gap, 0.0)
         total += stop.stiffness * depth ** (stop.exponent + 1.0) / (stop.exponent + 1.0)
     return total
