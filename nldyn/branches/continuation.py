@@ -30,10 +30,10 @@ from nldyn.branches.endings import Ending, StopReason, StopReasons
 from nldyn.branches.leg import Leg, LegBuilder
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
-from nldyn.flow.prefetch import Ahead
 from nldyn.orbits.bordered import FREE, OrbitFamily, Place, correct
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
+from nldyn.runtime.prefetch import Ahead
 from nldyn.runtime.progress import of_value, shows_progress
 from nldyn.runtime.threads import one_thread
 from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, told_value, value_of

@@ -236,7 +236,14 @@ def own_processes(jobs: int) -> Iterator[ProcessPoolExecutor | None]:
     if jobs <= 1:
         yield None
         return
-    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), quiet_process)
+    with process_pool(jobs) as pool:
+        yield pool
+
+
+@contextmanager
+def process_pool(count: int) -> Iterator[ProcessPoolExecutor]:
+    """So many processes that end with the block, whatever they are at."""
+    pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), quiet_process)
     try:
         yield pool
     finally:

@@ -29,11 +29,11 @@ from nldyn.branches.continuation import (
 from nldyn.branches.endings import Ending
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
-from nldyn.flow.prefetch import Ahead, Task
 from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.orbit import Orbit, minimal_period, stroboscopic
 from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import orbit_near
+from nldyn.runtime.prefetch import Ahead, Task
 from nldyn.runtime.progress import Progress
 from nldyn.search.outlook import Outlook
 from nldyn.system.chart import FREQUENCY, Chart

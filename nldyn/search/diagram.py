@@ -27,7 +27,6 @@ from nldyn.branches.checkpoint import BranchFile, checkpoint_of_several
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.branches.tables import Part, to_pandas, to_xarray
 from nldyn.flow.flow_map import FlowMap, flow_of, same_flow
-from nldyn.flow.prefetch import Ahead, computing_ahead
 from nldyn.orbits.newton import NO_PLACE
 from nldyn.orbits.orbit import Orbit, check_observe
 from nldyn.orbits.starts import (
@@ -37,6 +36,7 @@ from nldyn.orbits.starts import (
     reach,
     simulate_strobe,
 )
+from nldyn.runtime.prefetch import Ahead, computing_ahead
 from nldyn.runtime.progress import Progress, shows_progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.collector import Collector, counted

@@ -24,7 +24,6 @@ from nldyn.branches.branch import Branch
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, flow_of
-from nldyn.flow.prefetch import computing_ahead
 from nldyn.orbits.deflation import deflated_orbit
 from nldyn.orbits.orbit import Orbit, check_observe, same_orbit, stroboscopic
 from nldyn.orbits.shooting import LONGEST_PERIOD
@@ -35,6 +34,7 @@ from nldyn.orbits.starts import (
     random_states,
     settling_periods,
 )
+from nldyn.runtime.prefetch import computing_ahead
 from nldyn.runtime.progress import Progress, shows_progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.collector import Collector

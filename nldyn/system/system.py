@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypedDict, Unpack
 
 import numpy as np
 import scipy.linalg as sla
@@ -38,7 +38,6 @@ from nldyn.system.springs_dampers import (
 from nldyn.system.stop import Stop
 from nldyn.system.values import SAME_ENTRY, ZERO_ENTRY
 
-Element = TypeVar("Element")
 AnySpring = Spring | PolynomialSpring
 AnyDamper = Damper | CubicDamper
 LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
@@ -60,6 +59,15 @@ class Clock(NamedTuple):
 
     omega: float
     start: float
+
+
+class Elements(TypedDict, total=False):
+    """What acts at the interfaces of a system; excitation on load vectors, too."""
+
+    stops: Sequence[AnyStop]
+    dampers: Sequence[AnyDamper]
+    excitation: Sequence[Excitation]
+    springs: Sequence[AnySpring]
 
 
 class ReducedModelLike(Protocol):
@@ -157,11 +165,8 @@ class System:
         participation: Mapping[str, ArrayLike],
         *,
         modal_damping: float | ArrayLike = 0.0,
-        stops: Sequence[AnyStop] = (),
-        dampers: Sequence[AnyDamper] = (),
-        excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
-        springs: Sequence[AnySpring] = (),
+        **acting: Unpack[Elements],
     ) -> System:
         """System from modal data typed in by hand.
 
@@ -193,11 +198,8 @@ class System:
             omega,
             _modal_damping(omega, modal_damping),
             _vectors("participation", participation),
-            _listed("stops", stops),
-            _listed("dampers", dampers),
-            _listed("excitation", excitation),
-            _vectors("loads", loads),
-            _listed("springs", springs),
+            loads=_vectors("loads", loads),
+            **_listed(acting),
         )
 
     @classmethod
@@ -209,14 +211,11 @@ class System:
         *,
         damping: ArrayLike | None = None,
         modal_damping: float | ArrayLike = 0.0,
-        stops: Sequence[AnyStop] = (),
-        dampers: Sequence[AnyDamper] = (),
-        excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
-        springs: Sequence[AnySpring] = (),
         gyroscopic: ArrayLike | None = None,
         circulatory: ArrayLike | None = None,
         spin: Spin | None = None,
+        **acting: Unpack[Elements],
     ) -> System:
         """System from mass, stiffness and damping matrices.
 
@@ -283,12 +282,9 @@ class System:
             omega,
             D,
             participation,
-            _listed("stops", stops),
-            _listed("dampers", dampers),
-            _listed("excitation", excitation),
-            modal_loads,
-            _listed("springs", springs),
-            N,
+            loads=modal_loads,
+            circulatory=N,
+            **_listed(acting),
         )._spun(None if spin is None else _of_size(spin, omega.size).on(modes))
 
     @classmethod
@@ -297,14 +293,11 @@ class System:
         reduced: ReducedModelLike,
         *,
         modal_damping: float | ArrayLike = 0.0,
-        stops: Sequence[AnyStop] = (),
-        dampers: Sequence[AnyDamper] = (),
-        excitation: Sequence[Excitation] = (),
         loads: Mapping[str, ArrayLike] = MappingProxyType({}),
-        springs: Sequence[AnySpring] = (),
         gyroscopic: ArrayLike | None = None,
         circulatory: ArrayLike | None = None,
         spin: Spin | None = None,
+        **acting: Unpack[Elements],
     ) -> System:
         """System from a reduced model (anything with frequencies and participations).
 
@@ -368,12 +361,11 @@ class System:
             system.natural_frequencies,
             total,
             system.participation,
-            _listed("stops", stops),
-            _listed("dampers", dampers),
-            _listed("excitation", excitation),
-            {**system.loads, **_vectors("loads", loads)},
-            _listed("springs", springs),
-            None if circulatory is None else skew("circulatory", circulatory, system.size),
+            loads={**system.loads, **_vectors("loads", loads)},
+            circulatory=(
+                None if circulatory is None else skew("circulatory", circulatory, system.size)
+            ),
+            **_listed(acting),
         )._spun(None if spin is None else _of_size(spin, system.size))
 
     @property
@@ -731,33 +723,20 @@ class System:
             self, damping=self.damping + G, circulatory=N if np.any(N) else None, spin=spin
         )
 
-    def with_elements(
-        self,
-        *,
-        stops: tuple[AnyStop, ...] | None = None,
-        excitation: tuple[Excitation, ...] | None = None,
-        springs: tuple[AnySpring, ...] | None = None,
-    ) -> System:
+    def with_elements(self, **changed: Unpack[Elements]) -> System:
         """The same structure with elements whose numbers differ, at the same interfaces.
 
         Of the springs, polynomial ones may. The linear part is shared, which saves most of the
         work of making a system.
         """
         other = copy.copy(self)
-        own = {field.name for field in fields(self)} | {
-            "linear",
-            "total_damping",
-            "spring_stiffness",
-            "stiffness",
-        }
-        for derived in vars(self).keys() - own:
+        if changed.keys() - {"stops", "excitation", "springs"}:
+            raise TypeError("with_elements takes stops, excitation and springs")
+        kept = {"linear", "total_damping", "spring_stiffness", "stiffness"}
+        for derived in vars(self).keys() - {own.name for own in fields(self)} - kept:
             del vars(other)[derived]
-        if stops is not None:
-            object.__setattr__(other, "stops", _listed("stops", stops))
-        if excitation is not None:
-            object.__setattr__(other, "excitation", _listed("excitation", excitation))
-        if springs is not None:
-            object.__setattr__(other, "springs", _listed("springs", springs))
+        for name, elements in _listed(changed).items():
+            object.__setattr__(other, name, elements)
         other._check_interfaces()
         return other
 
@@ -832,11 +811,15 @@ def _told_of_loads(kind: str, loads: Mapping[str, Real]) -> str:
     return f"; load vectors: {', '.join(loads)}" if loads and kind == "excitation" else ""
 
 
-def _listed(name: str, elements: Sequence[Element]) -> tuple[Element, ...]:
-    try:
-        return tuple(elements)
-    except TypeError:
-        raise SystemModelError(f"{name} must be a list, got {shown(elements)}") from None
+def _listed(acting: Elements) -> dict[str, Any]:
+    """Elements of each kind as a tuple."""
+    listed: dict[str, Any] = {}
+    for name, elements in acting.items():
+        try:
+            listed[name] = tuple(elements)  # type: ignore[arg-type]
+        except TypeError:
+            raise SystemModelError(f"{name} must be a list, got {shown(elements)}") from None
+    return listed
 
 
 def _vectors(name: str, vectors: Mapping[str, ArrayLike]) -> dict[str, Real]:

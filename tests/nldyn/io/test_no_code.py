@@ -22,7 +22,7 @@ from nldyn.io.curves import load_curves
 from nldyn.runtime.unfinished import unfinished_path
 
 RUN_CODE = {"pickle", "_pickle", "cloudpickle", "dill", "joblib", "marshal", "shelve"}
-BETWEEN_PROCESSES = {"nldyn/flow/prefetch.py"}
+BETWEEN_PROCESSES = {"nldyn/runtime/prefetch.py"}
 ran = []
 
 

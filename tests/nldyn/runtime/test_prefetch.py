@@ -19,9 +19,9 @@ from nldyn import (
     diagram,
     explore,
 )
-from nldyn.flow.prefetch import Ahead, computing_ahead
 from nldyn.io import CheckpointFile
 from nldyn.orbits import OrbitSearchOptions
+from nldyn.runtime.prefetch import Ahead, computing_ahead
 
 WANTED = {
     "range_hz": (30.0, 60.0),

@@ -10,16 +10,14 @@ from __future__ import annotations
 import io
 import pickle
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from multiprocessing import get_context
 from typing import Any, TypeVar
 
-from nldyn.flow.flow_map import FlowMap
-from nldyn.runtime.executors import quiet_process, stop_processes
+from nldyn.runtime.executors import process_pool
 from nldyn.runtime.interruption import ignored_interruption, interrupted
 from nldyn.runtime.threads import one_thread
 
@@ -30,15 +28,15 @@ LOOK = 0.1  # s, between two looks at a result that is waited for
 
 @dataclass
 class Task:
-    """A function of a flow map and other arguments, whose value may be asked for.
+    """A function of what all have in common and of other arguments, whose value may be asked for.
 
     Parameters
     ----------
     key : hashable
         What it is asked for by.
     function, arguments
-        At the top of a module, called as ``function(flow, *arguments)``, and where it is called in
-        this process perhaps with ``look``, to be called now and then.
+        At the top of a module, called as ``function(shared, *arguments)``, and where it is called
+        in this process perhaps with ``look``, to be called now and then.
     group : hashable, optional
         Of several of one group, one at a time is worth while: what it gives may tell that the
         others are not needed. Parts of one have the same ``member`` of the group.
@@ -54,12 +52,12 @@ class Task:
 
 @dataclass
 class Ahead:
-    """What is computed ahead for one flow map; without an executor nothing is.
+    """What is computed ahead; without an executor nothing is.
 
     Parameters
     ----------
-    flow : FlowMap
-        First argument of all functions.
+    shared : object
+        First argument of all functions, such as a flow map; it is sent once.
     executor : Executor, optional
         Where.
     places : int
@@ -67,14 +65,11 @@ class Ahead:
 
     Examples
     --------
-    >>> from nldyn import HarmonicForce, System
-    >>> system = System.from_modal([10.0], {"tip": [1.0]}, modal_damping=0.01,
-    ...     excitation=[HarmonicForce("tip", 1.0)])
-    >>> Ahead(FlowMap(system)).value("size", lambda flow: flow.system.size)
-    1
+    >>> Ahead([1, 2, 3]).value("size", len)
+    3
     """
 
-    flow: FlowMap
+    shared: Any
     executor: Executor | None = None
     places: int = 0
     waiting: list[Task] = field(default_factory=list)
@@ -84,8 +79,8 @@ class Ahead:
     taken: list[Future[bytes]] = field(default_factory=list)  # waited for, or useless by now
 
     @cached_property
-    def _sent_flow(self) -> bytes:
-        return pickle.dumps(self.flow, pickle.HIGHEST_PROTOCOL)
+    def _sent(self) -> bytes:
+        return pickle.dumps(self.shared, pickle.HIGHEST_PROTOCOL)
 
     def __repr__(self) -> str:
         return f"<Ahead: {len(self.waiting)} tasks wait, {len(self.begun)} begun>"
@@ -135,9 +130,9 @@ class Ahead:
         assert self.executor is not None
         try:
             # pickled here and now: a pool's thread would meet objects that are being changed
-            sent = _dumped((task.function, task.arguments), self.flow)
+            sent = _dumped((task.function, task.arguments), self.shared)
             with ignored_interruption():  # nor by the processes that this starts
-                task.future = self.executor.submit(_computed, self._sent_flow, sent)
+                task.future = self.executor.submit(_computed, self._sent, sent)
         except RuntimeError:  # it takes no more: all else is computed here
             self.executor = None
             return
@@ -162,7 +157,7 @@ class Ahead:
             if found is not None:
                 value = found[0]
                 return value
-        return function(self.flow, *arguments)
+        return function(self.shared, *arguments)
 
     def forget(self, key: Hashable) -> None:
         """Nobody will ask for a task, or it is computed here after all."""
@@ -187,7 +182,7 @@ class Ahead:
                 self._prepare(other)
         self.look()
         try:
-            return (_loaded(future.result(), self.flow),)
+            return (_loaded(future.result(), self.shared),)
         except BrokenProcessPool:
             self.executor = None
             return None
@@ -196,7 +191,7 @@ class Ahead:
         """Compute a task here that may be asked for; an error is told only if it is."""
         self.waiting.remove(task)
         try:
-            value = task.function(self.flow, *task.arguments, look=self.look)
+            value = task.function(self.shared, *task.arguments, look=self.look)
         except Exception as error:
             if interrupted(error):
                 raise
@@ -217,7 +212,7 @@ class Ahead:
         """
         if not keys:
             return []
-        found: dict[Hashable, Value] = {keys[0]: function(self.flow, *arguments[0])}
+        found: dict[Hashable, Value] = {keys[0]: function(self.shared, *arguments[0])}
         each(1, found[keys[0]])
         rest = list(zip(keys, arguments, strict=True))[1:]
         for key, given in rest:
@@ -255,70 +250,65 @@ class Ahead:
 
 
 class _Sender(pickle.Pickler):
-    """Pickles everything but the flow map, which the receiver has."""
+    """Pickles everything but what is shared, which the receiver has."""
 
-    def __init__(self, file: io.BytesIO, flow: FlowMap) -> None:
+    def __init__(self, file: io.BytesIO, shared: Any) -> None:
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
-        self.flow = flow
+        self.shared = shared
 
     def persistent_id(self, obj: Any) -> str | None:
-        return "flow" if obj is self.flow else None
+        return "shared" if obj is self.shared else None
 
 
 class _Receiver(pickle.Unpickler):
     """Reads what a `_Sender` of an own process wrote."""
 
-    def __init__(self, file: io.BytesIO, flow: FlowMap) -> None:
+    def __init__(self, file: io.BytesIO, shared: Any) -> None:
         super().__init__(file)
-        self.flow = flow
+        self.shared = shared
 
-    def persistent_load(self, pid: Any) -> FlowMap:
-        return self.flow
-
-
-def _loaded(content: bytes, flow: FlowMap) -> Any:
-    return _Receiver(io.BytesIO(content), flow).load()
+    def persistent_load(self, pid: Any) -> Any:
+        return self.shared
 
 
-def _dumped(value: Any, flow: FlowMap) -> bytes:
+def _loaded(content: bytes, shared: Any) -> Any:
+    return _Receiver(io.BytesIO(content), shared).load()
+
+
+def _dumped(value: Any, shared: Any) -> bytes:
     file = io.BytesIO()
-    _Sender(file, flow).dump(value)
+    _Sender(file, shared).dump(value)
     return file.getvalue()
 
 
 @one_thread()
-def _computed(flow: bytes, task: bytes) -> bytes:
+def _computed(shared: bytes, task: bytes) -> bytes:
     """Compute the value of a task, in another process."""
-    own = _flow(flow)
+    own = _unpacked(shared)
     function, arguments = _loaded(task, own)
     return _dumped(function(own, *arguments), own)
 
 
 @lru_cache(maxsize=4)
-def _flow(content: bytes) -> FlowMap:
-    flow: FlowMap = pickle.loads(content)
-    return flow
+def _unpacked(content: bytes) -> Any:
+    return pickle.loads(content)
 
 
 @contextmanager
 def computing_ahead(
-    flow: FlowMap, jobs: int = 1, executor: Executor | None = None
+    shared: Any, jobs: int = 1, executor: Executor | None = None
 ) -> Iterator[Ahead]:
     """An `Ahead` on an executor, or with so many processes, this one included.
 
     Whatever is not asked for is ended with the block.
     """
     if executor is not None:
-        yield Ahead(flow, executor, max(jobs - 1, 1) if jobs > 1 else _places(executor))
-        return
-    if jobs == 1 or not _can_be_sent(flow):
-        yield Ahead(flow)
-        return
-    pool = ProcessPoolExecutor(jobs - 1, get_context("spawn"), quiet_process)
-    try:
-        yield Ahead(flow, pool, jobs - 1)
-    finally:
-        stop_processes(pool)
+        yield Ahead(shared, executor, max(jobs - 1, 1) if jobs > 1 else _places(executor))
+    elif jobs == 1 or not _can_be_sent(shared):
+        yield Ahead(shared)
+    else:
+        with process_pool(jobs - 1) as pool:
+            yield Ahead(shared, pool, jobs - 1)
 
 
 def _places(executor: Executor) -> int:
@@ -326,10 +316,10 @@ def _places(executor: Executor) -> int:
     return workers if isinstance(workers, int) else 1
 
 
-def _can_be_sent(flow: FlowMap) -> bool:
-    """Whether a flow map can go to another process: a law from a notebook cannot."""
+def _can_be_sent(shared: Any) -> bool:
+    """Whether it can go to another process: a law from a notebook cannot."""
     try:
-        pickle.dumps(flow)
+        pickle.dumps(shared)
     except Exception as error:
         if interrupted(error):
             raise
