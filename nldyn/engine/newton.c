@@ -11,7 +11,9 @@
 
 /* One call: what is asked for, and where the answers go. All fields have eight bytes. */
 typedef struct {
-    int64_t recording, chained, with_columns, n_segments, n_unknowns, n_parameters;
+    int64_t recording, chained, with_columns, n_segments;
+    int64_t n_unknowns; /* none for the flow map alone */
+    int64_t n_parameters;
     int64_t max_iterations; /* most steps; none means the flow map alone */
     int64_t wanted_closings; /* how often stops close in the motion from the guess, or -1 */
     double omega; /* excitation frequency, of the flow map alone */
@@ -20,7 +22,8 @@ typedef struct {
     double rtol; /* longest last step */
     double longest; /* farthest distance of the first corrected point from `aim` */
     double turn; /* least cosine of the first tangent and the normal of the plane, in the metric */
-    double *point; /* (n_unknowns,) states at the phases and ln ω; the guess, then the solution */
+    /* (n_unknowns,) states at the phases and ln ω; the guess, then the solution; or states alone */
+    double *point;
     const double *phases; /* (n_segments + 1,) */
     const int64_t *parameters;
     const Complex *drive_by; /* (n_parameters, h, 3, 2n) derivative of `drive` by each */
@@ -262,7 +265,7 @@ static void lay_out(Block *block, const Gauss *tab, Call *call)
     lay_out_motion(block, fl, M);
     lay_out_contacts(block, fl, tab, &call->scratch);
     lay_out_jumps(block, fl, m, M->n_columns, &call->scratch);
-    size_t n = task->max_iterations > 0 ? task->n_unknowns : 0;
+    size_t n = task->n_unknowns;
     call->matrix = numbers(block, n * n);
     call->sides = numbers(block, 2 * n);
     call->known = n > 0 ? numbers(block, task->n_segments * (size_t)fl->size * fl->size) : NULL;

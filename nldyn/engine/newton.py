@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import struct
+from functools import lru_cache
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -65,7 +66,7 @@ class Found(NamedTuple):
     first, last : float
         Lengths of the first and the last step.
     along : (N + 1,)
-        Vector along the branch, of no particular length.
+        Vector along the branch, of no particular length; none of the flow map alone.
     ends, jacobians, d_omegas, d_parameters : (k, 2n), (k, 2n, 2n), (k, 2n), (k, 2n, n_parameters)
         Of the segments, at the point before the last step, where the record is from, too.
     closings : (n_stops,)
@@ -126,8 +127,9 @@ def newton(
         Whether to record.
     omega : float
         Excitation frequency, of the flow map alone.
-    point : (N + 1,)
-        States at the k phases and ln ω; the guess, then the solution.
+    point : (N + 1,), or at least so many states as are needed
+        States at the k phases and ln ω; the guess, then the solution. States for the flow map
+        alone, which leaves them as they are.
     phases : (k + 1,)
         Forcing phases of the segment ends.
     chained : bool
@@ -142,29 +144,39 @@ def newton(
         Of the state, and of the stops and bonds.
     """
     row, level, state_weight, rtol, longest, max_iterations, aim, wanted, turn = corrector
-    row, aim, phases = reals(row), reals(aim), reals(phases)
-    k, n, count = phases.size - 1, point.size, len(parameters)
-    kept = k if with_columns else 1
-    jacobians, closings = np.empty((kept, size, size)), np.empty(n_stops, dtype=np.int64)
-    sizes = 3, n, k * size, kept * size, kept * size * count
-    # each begins where a vector register may: sums of BLAS depend on it
-    starts = [0, *accumulate(-(-each // WIDTH) * WIDTH for each in sizes)]
-    numbers = np.zeros(starts[-1])
+    k, count = phases.size - 1, len(parameters)
+    n, kept = point.size if max_iterations else 0, k if with_columns else 1
+    room, starts, parts = _answers(
+        3, n, k * size, kept * size * size, kept * size, kept * size * count, n_stops
+    )
+    numbers = np.zeros(room)
     first_place = address_of(numbers)
-    told, along, ends, d_omegas, by = (first_place + 8 * start for start in starts[:-1])
+    row, aim, phases = reals(row), reals(aim), reals(phases)
     task = _TASK.pack(
         recording, chained, with_columns, k, n, count, max_iterations, wanted,
-        omega, level, state_weight, rtol, longest, turn,
-        address_of(point), address_of(phases), address_of(parameters), address_of(drive_by),
-        address_of(row), address_of(aim), told, along, ends, address_of(jacobians), d_omegas, by,
-        address_of(closings),
+        omega, level, state_weight, rtol, longest, turn, address_of(point), address_of(phases),
+        address_of(parameters) if count else 0, address_of(drive_by) if count else 0,
+        address_of(row) if n else 0, address_of(aim) if n else 0,
+        *[first_place + start for start in starts],
     )  # fmt: skip
     outcome = _newton(HOST, system.content, tables.content, record.content, task)
     if outcome == OUT_OF_MEMORY:
         raise MemoryError("no memory for a motion with so many modes and stops")
-    iterations, first, last = numbers[:3].tolist()
-    parts = [numbers[a : a + each] for a, each in zip(starts, sizes, strict=False)]
+    told, along, ends, jacobians, d_omegas, by, closings = [numbers[part] for part in parts]
+    iterations, first, last = told.tolist()
     return Found(
-        outcome, int(iterations), first, last, parts[1], parts[2].reshape(k, size), jacobians,
-        parts[3].reshape(kept, size), parts[4].reshape(kept, size, count), closings,
+        outcome, int(iterations), first, last, along, ends.reshape(k, size),
+        jacobians.reshape(kept, size, size), d_omegas.reshape(kept, size),
+        by.reshape(kept, size, count), closings.view(np.int64),
     )  # fmt: skip
+
+
+@lru_cache
+def _answers(*sizes: int) -> tuple[int, list[int], list[slice]]:
+    """Room for arrays of so many numbers in one, where each begins, in bytes, and its part.
+
+    Each begins where a vector register may: sums of BLAS depend on it.
+    """
+    starts = [0, *accumulate(-(-each // WIDTH) * WIDTH for each in sizes)]
+    parts = [slice(a, a + each) for a, each in zip(starts, sizes, strict=False)]
+    return starts[-1], [8 * start for start in starts[:-1]], parts

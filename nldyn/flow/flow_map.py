@@ -58,9 +58,9 @@ from nldyn.system.system import Clock, System, same_system
 
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 
+_NONE = Corrector(np.empty(0), 0.0, 0.0, 0.0, 0.0, 0, np.empty(0), -1, 0.0)
 BUNCH = 20  # excitation periods in one compiled call, where many follow each other
 _REASONS = {
-    OK: "",
     TOO_MANY_PIECES: "more than 20000 flights and contact panels in one segment: too many contacts "
     "or too fast a mode (more `segments` of solve_orbit help)",
     TOO_MANY_STEPS: "a stop stays so close to a touch that the search for it takes too many steps",
@@ -560,8 +560,8 @@ class FlowMap:
         nodes, phases = _floats("nodes", nodes), np.ascontiguousarray(_floats("phases", phases))
         self._check_segments(nodes, phases, omega, chained)
         return self._call(
-            record, recording, float(omega), _with_zero(nodes), phases, chained, sensitivities,
-            parameters,
+            record, recording, float(omega), np.ascontiguousarray(nodes), phases, chained,
+            sensitivities, parameters,
         )  # fmt: skip
 
     def _call(
@@ -577,18 +577,22 @@ class FlowMap:
         corrector: Corrector | None = None,
     ) -> Found:
         """The engine, which corrects the point (N + 1,) or, without corrector, only flies."""
-        corrector = corrector or Corrector(point, 0.0, 0.0, 0.0, 0.0, 0, point, -1, 0.0)
         table, drive_by = (
             parameter_tables(self.system, parameters) if parameters else self._no_parameters
         )
         found = newton(
             self._packed, self._packed_tables, record, recording, omega, point, phases, chained,
-            sensitivities, table, drive_by, corrector, 2 * self.system.size, len(self._pushed),
+            sensitivities, table, drive_by, corrector or _NONE, 2 * self.system.size,
+            len(self._pushed),
         )  # fmt: skip
-        return found._replace(closings=found.closings[: len(self.system.stops)])
+        if self.system.bonds:  # which come after the stops, and never close
+            return found._replace(closings=found.closings[: len(self.system.stops)])
+        return found
 
     def _reason(self, status: int) -> str:
         """Why the engine gave up; empty if they did not."""
+        if status == OK:
+            return ""
         softens = any(bond.coefficients and not bond.bounded for bond in self.system.bonds)
         if status == CONTACT_FAILED and softens:
             return "the motion runs away along a spring that softens"
@@ -640,13 +644,6 @@ class FlowMap:
         return empty_record(
             capacity, 2 * self.system.size, len(self._pushed), self.tables.nodes.size
         )
-
-
-def _with_zero(nodes: Real) -> Real:
-    """The numbers of the nodes, and a zero in the place of ln ω."""
-    point = np.zeros(nodes.size + 1)
-    point[:-1] = nodes.ravel()
-    return point
 
 
 def _remember(pieces: Record, record: Record) -> None:
@@ -762,9 +759,7 @@ class Trajectory:
         start = np.maximum.accumulate(np.where(begins, 0, np.arange(begins.size)))[piece[inside]]
         legs = np.stack([rec.phase[start], phases[inside]], axis=1).ravel()
         nodes = np.repeat(rec.start[start], 2, axis=0)[:-1]
-        found = flow._call(
-            flow._no_room, False, self.omega, _with_zero(nodes), legs, False, False, ()
-        )
+        found = flow._call(flow._no_room, False, self.omega, nodes, legs, False, False, ())
         return (inside, found.ends[::2]) if found.outcome == OK else none
 
     @cached_property
