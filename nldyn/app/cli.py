@@ -153,7 +153,8 @@ def run(work: Work, log: bool, as_json: bool, jobs: int) -> Told:
     parts.end("model")
     before = None if work.replace else computed_before(out, scene, structure)
     given = scene, parts.part("branches"), CheckpointFile(work.unfinished), jobs, structure
-    found = before or (explore_scene(*given) if scene.explore else compute(*given))
+    follow = explore_scene if scene.explore else compute
+    found = before or work.found(lambda: follow(*given))
     if before is None or log:
         work.line("report", 0.0, 1.0)
         yscale: Literal["linear", "log"] = "log" if log else "linear"

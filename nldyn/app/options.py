@@ -39,7 +39,7 @@ mesh_option = click.option(
 replace_option = click.option(
     "--replace",
     is_flag=True,
-    help="Compute anew, also where DIR holds finished results of this scene or of another one.",
+    help="Compute anew, and replace what DIR holds of this scene or another one, finished or not.",
 )
 quiet_option = click.option("--quiet", is_flag=True, help="Show no progress.")
 jobs_option = click.option(

@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -19,6 +19,8 @@ from nldyn.report.console import kept_at_interrupt, plain_errors
 if TYPE_CHECKING:
     from nldyn.runtime.progress import ProgressLine
     from nldyn.scene.schema import Scene
+
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,24 @@ class Work:
     line: ProgressLine
     unfinished: Path | None
     start: float
+
+    def found(self, compute: Callable[[], Found]) -> Found:
+        """What is computed; unfinished work of something else is refused or, if wanted, replaced.
+
+        Raises
+        ------
+        KeptWorkError
+            If it is refused.
+        """
+        from nldyn.base.errors import KeptWorkError
+
+        try:
+            return compute()
+        except KeptWorkError as error:
+            if not self.replace or self.unfinished is None:
+                raise KeptWorkError(f"{error}, or begin anew with --replace") from error
+            self.unfinished.unlink(missing_ok=True)
+            return compute()
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,10 @@ class SystemModelError(ValueError):
     """A system, stop, damper or excitation that cannot be modelled; one sentence says why."""
 
 
+class KeptWorkError(SystemModelError):
+    """A file of unfinished work that holds that of something else; one sentence says what."""
+
+
 class SceneError(ValueError):
     """A scene file that cannot be used; one sentence names the file, the key and the reason."""
 

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from nldyn.base.errors import SystemModelError
+from nldyn.base.errors import KeptWorkError
 from nldyn.branches.branch import Branch, Course
 from nldyn.flow.flow_map import FlowMap, same_flow
 from nldyn.orbits.bordered import Place
@@ -111,7 +111,7 @@ class Checkpoint(Keeper[Branch]):
 
         Raises
         ------
-        SystemModelError
+        KeptWorkError
             If the file is strict and holds something else.
         """
         for course in courses:
@@ -119,7 +119,7 @@ class Checkpoint(Keeper[Branch]):
                 if _is_begun_at(branch, place, course):
                     return self._taken(number)
         if self._strict and self._earlier:
-            raise SystemModelError(
+            raise KeptWorkError(
                 f"{self._strict}: holds another continuation (other system, start, range or "
                 "options); choose another file, or delete it"
             )
@@ -190,7 +190,7 @@ def checkpoint_of_several(
         same_range = branch.course is not None and branch.course.limits == limits
         same = same_flow(branch.nodes[0].family.problem.flow, flow)
         if not (same_range and same and branch.parameter == parameter):
-            raise SystemModelError(
+            raise KeptWorkError(
                 f"{place.name}: holds branches of another system, accuracy or range; choose "
                 "another file, or delete it"
             )

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from nldyn.base.arrays import SLACK, Real
-from nldyn.base.errors import ConvergenceError, SystemModelError, check_range, check_types, numbers
+from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, numbers
 from nldyn.bifurcations.branch_crossing import (
     NEIGHBOUR,
     ON_CROSSING,
@@ -130,7 +130,7 @@ def continue_branch(
     if isinstance(start, Branch):
         return extended(start, limits, options, at, progress, checkpoint, parameter)
     if limits is None:
-        raise SystemModelError("continue_branch: an orbit needs a range, limits")
+        raise SystemModelError("continue_branch: an orbit needs limits, the range of its parameter")
     check_types(
         start=(start, Orbit),
         name=(name, str),
@@ -181,8 +181,6 @@ def chart_over(
 ) -> Chart:
     """The chart of a parameter of a system over a range, checked; of the frequency for None."""
     chosen = checked_parameter(system, FREQUENCY if parameter is None else parameter)
-    if chosen.name == FREQUENCY:
-        return Chart(chosen, *check_range(limits))
     return Chart.of(chosen, limits)
 
 
@@ -229,9 +227,7 @@ def _chart_beyond(branch: Branch, limits: tuple[float, float]) -> Chart:
     chart = branch.nodes[0].family.charts[0]
     assert branch.course is not None
     low, high = branch.course.limits
-    wider = chart_over(branch.nodes[0].family.system, limits, chart.parameter)
-    if chart.parameter.name != FREQUENCY:
-        wider = chart.over(limits)
+    wider = chart.over(limits)
     if not wider.low <= low < high <= wider.high:
         raise SystemModelError(
             f"{chart.range_name} = ({wider.low:g}, {wider.high:g}) must contain the range of the "

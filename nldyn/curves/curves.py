@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.base.errors import (
     ConvergenceError,
+    KeptWorkError,
     LocateError,
     SystemModelError,
     check_choice,
@@ -533,7 +534,7 @@ def _keeper(place: CurveFile | None, known: Curve | None = None) -> Keeper[Curve
         monitor = condition.monitor if isinstance(condition, Held) else None
         held = place.read_curves(known.orbits[0].system, monitor)
         if not (len(held) == 1 and _is_piece(held[0], known)):
-            raise SystemModelError(
+            raise KeptWorkError(
                 f"{place.name}: holds another curve, or more of this one; choose another file, or "
                 "delete it"
             )

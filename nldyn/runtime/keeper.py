@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Generic, Self, TypeVar
 
-from nldyn.base.errors import SystemModelError
+from nldyn.base.errors import KeptWorkError, SystemModelError
 from nldyn.runtime.result_directory import OutputError
 
 Kept = TypeVar("Kept")
@@ -91,4 +91,4 @@ def begun_before(read: Callable[[Path], Kept], path: Path) -> Kept:
         return read(path)
     except SystemModelError as error:
         advice = "choose another file, or delete it to begin anew"
-        raise SystemModelError(f"{error}; {advice}") from error
+        raise KeptWorkError(f"{error}; {advice}") from error

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from nldyn.base.errors import SceneError
+from nldyn.base.errors import KeptWorkError, SceneError
 from nldyn.scene.messages import KeyPath, scene_error, table_at
 from nldyn.scene.schema import Scene
 
@@ -16,6 +16,8 @@ def told_as(scene: Scene, key: KeyPath, *kinds: type[Exception], hint: str = "")
     """Tell an error of a lower layer as one of this scene's."""
     try:
         yield
+    except KeptWorkError:  # the scene has no part in it
+        raise
     except kinds as error:
         text = str(error).rstrip(".") + hint
         word, _, rest = text.partition(" ")

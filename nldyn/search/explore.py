@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import (
+    KeptWorkError,
     SystemModelError,
     check_range,
     check_types,
@@ -263,7 +264,7 @@ class _Survey:
                 notes=kept.diagram.notes[: len(self.known.notes)],
             )
             if not (self.question.same(kept.question) and _same_branches(given, self.known)):
-                raise SystemModelError(
+                raise KeptWorkError(
                     f"{place.name}: holds another exploration (other system, range, periods, "
                     "effort, options or known branches); choose another file, or delete it"
                 )

@@ -348,8 +348,6 @@ class Chart:
     @property
     def range_name(self) -> str:
         """How messages call the range."""
-        if self.parameter.name == FREQUENCY:
-            return "range_hz"
         return f"the range of {parameter_name(self.parameter)}"
 
     def check_start(self, value: float) -> None:

@@ -304,7 +304,8 @@ def test_ranges_in_which_there_are_no_systems_are_refused(orbit):
 def test_places_of_which_the_branches_do_not_tell_are_refused(harmonic_branch, flip):
     check_named(refused(lambda x: index_sum([harmonic_branch], x), 2.0, 200.0), "was followed from")
     check_named(refused(lambda x: index_sum(x, 26.0), []), "branches must not be empty")
-    check_named(refused(lambda x: cascade(flip, 2, limits=x), (1.0, 2.0)), "lies outside range")
+    outside = refused(lambda x: cascade(flip, 2, limits=x), (1.0, 2.0))
+    check_named(outside, "lies outside the range of frequency_hz")
 
 
 @pytest.mark.parametrize("name", ["period", "segments"])
@@ -358,5 +359,5 @@ def test_element_that_a_system_does_not_have_is_told_apart_from_none_at_all():
     ):
         with pytest.raises(SystemModelError, match=told):
             continue_orbit(orbit, Parameter(name, index), (1.0, 2.0))
-    with pytest.raises(SystemModelError, match="continue_branch: an orbit needs a range"):
+    with pytest.raises(SystemModelError, match="an orbit needs limits, the range of its"):
         continue_branch(orbit, None)

@@ -231,7 +231,7 @@ def test_places_to_look_at_are_refused_beside_explore(tmp_path):
     assert "continuation.search_points is of no use beside [explore]" in result.stderr
 
 
-def test_an_unfinished_run_of_another_scene_is_refused_and_kept(whole, tmp_path):
+def test_an_unfinished_run_of_another_scene_is_kept_unless_it_shall_be_replaced(whole, tmp_path):
     scene, out = short_scene(tmp_path), tmp_path / "out"
     scene.write_text(scene.read_text().replace("4.92e-6", "4.93e-6"))
     unfinished = tmp_path / "out.unfinished.h5"
@@ -239,8 +239,13 @@ def test_an_unfinished_run_of_another_scene_is_refused_and_kept(whole, tmp_path)
     before = unfinished.read_bytes()
     result = invoke("run", scene, "--out", out, "--quiet")
     assert result.exit_code == 2 and not out.exists()
-    assert "another system, accuracy or range; choose another file, or delete" in result.stderr
+    assert result.stderr == (
+        f"nldyn: {unfinished}: holds branches of another system, accuracy or range; choose another "
+        "file, or delete it, or begin anew with --replace\n"
+    )
     assert unfinished.read_bytes() == before
+    assert invoke("run", scene, "--out", out, "--quiet", "--replace").exit_code == 0
+    assert out.exists() and not unfinished.exists()
 
 
 def test_a_foreign_file_in_the_place_of_an_unfinished_run_is_named(tmp_path):
