@@ -28,6 +28,7 @@ from nldyn.app.describe import (
 from nldyn.app.options import (
     any_path,
     drawn_modes_option,
+    frequency_option,
     jobs_option,
     json_option,
     mesh_option,
@@ -498,13 +499,7 @@ def one_frequency_or_run_up(
 
 @main.command()
 @writes_results(check=one_frequency_or_run_up)
-@click.option(
-    "--frequency-hz",
-    type=click.FloatRange(1e-6, 1e12),
-    required=True,
-    metavar="HZ",
-    help="Excitation frequency, at which a run-up begins.",
-)
+@frequency_option("Excitation frequency, at which a run-up begins.")
 @click.option(
     "--periods",
     type=click.IntRange(1, 100_000),
@@ -567,13 +562,7 @@ def simulate(
 
 @main.command()
 @writes_results()
-@click.option(
-    "--frequency-hz",
-    type=click.FloatRange(1e-6, 1e12),
-    required=True,
-    metavar="HZ",
-    help="Excitation frequency.",
-)
+@frequency_option("Excitation frequency.")
 @click.option(
     "--x",
     callback=plane_state,
@@ -661,11 +650,8 @@ def period_of_an_orbit(period: int, frequency_hz: float | None, **_: Any) -> Non
 @writes_results(check=period_of_an_orbit)
 @drawn_modes_option
 @view_option
-@click.option(
-    "--frequency-hz",
-    type=click.FloatRange(1e-6, 1e12),
-    metavar="HZ",
-    help="Draw the orbit at this excitation frequency; else the highest harmonic one.",
+@frequency_option(
+    "Draw the orbit at this excitation frequency; else the highest harmonic one.", required=False
 )
 @click.option(
     "--period",

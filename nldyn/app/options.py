@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -83,6 +84,14 @@ def plane_state(
             f"'{value}' is neither displacement:INTERFACE nor velocity:INTERFACE"
         )
     return quantity, name
+
+
+def frequency_option(help: str, *, required: bool = True) -> Callable[[Any], Any]:
+    """The option of an excitation frequency in Hz."""
+    return click.option(
+        "--frequency-hz", type=click.FloatRange(1e-6, 1e12), required=required, metavar="HZ",
+        help=help,
+    )  # fmt: skip
 
 
 json_option = click.option(

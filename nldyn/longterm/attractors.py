@@ -459,10 +459,7 @@ def _settled(flow: FlowMap, state: Real, omega: float, periods: int) -> tuple[Re
     and is at rest once it has lost all but `ON_ORBIT` of that.
     """
     if flow.system.driven:
-        moved, failure = transient_end(flow, state, omega, periods)
-        if moved is None:
-            raise ConvergenceError(failure)
-        return moved, 0.0
+        return transient_end(flow, state, omega, periods), 0.0
     largest = float(np.linalg.norm(state))
     while periods > 0:
         run = _strobe(flow, state, omega, min(periods, BLOCK))
@@ -564,8 +561,10 @@ def _distance_later(
     decay = -orbit.stability.log_modulus / orbit.period
     needed = 2.0 * math.log(max(distance, 10.0 * ON_ORBIT) / ON_ORBIT) / max(decay, SLOWEST)
     count = int(min(needed, LONG_RUN)) + orbit.period
-    moved, _ = transient_end(flow, state, omega, count)
-    return math.inf if moved is None else _distance(orbit, moved) / scale
+    try:
+        return _distance(orbit, transient_end(flow, state, omega, count)) / scale
+    except ConvergenceError:
+        return math.inf
 
 
 def zero_one_test(values: Real) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -438,18 +438,12 @@ def _simulated(
     frequency_hz, state = case
     omega = 2.0 * math.pi * frequency_hz
     total = transient + periods
-    before, failure = transient_end(flow, state, omega, transient, lambda done: tell(done, total))
-    if before is None:
-        raise ConvergenceError(f"the transient at {frequency_hz:g} Hz failed: {failure}")
-    stretches = []
+    before = transient_end(flow, state, omega, transient, lambda done: tell(done, total))
     block = periods_at_once(flow, BLOCK)
-    for number, trajectory in enumerate(_blocks(flow, before, omega, transient, periods), start=1):
-        tell(min(transient + number * block, total), total)
-        failure = trajectory.failure
-        if trajectory.record.phase.size:
-            stretches.append(trajectory)
-        if failure:
-            break
+    stretches, failure = _recorded(
+        _blocks(flow, before, omega, transient, periods),
+        lambda number: tell(min(transient + number * block, total), total),
+    )
     if not stretches:
         raise ConvergenceError(f"the motion at {frequency_hz:g} Hz failed at once: {failure}")
     turns = transient + np.minimum(block * np.arange(len(stretches) + 1.0), periods)
@@ -458,6 +452,20 @@ def _simulated(
         turns[-1] = turns[-2] + (end_phase(lost) - lost.record.phase[0]) / (2.0 * math.pi)
     begins = np.asarray(turns / frequency_hz, dtype=float)
     return Motion(flow, tuple(stretches), begins, failure)
+
+
+def _recorded(
+    pieces: Iterable[Trajectory], tell: Callable[[int], None]
+) -> tuple[list[Trajectory], str]:
+    """Pieces of a motion up to the one that fails, and why; tells how many are done."""
+    stretches = []
+    for number, piece in enumerate(pieces, start=1):
+        if piece.record.phase.size:
+            stretches.append(piece)
+        if piece.failure:
+            return stretches, piece.failure
+        tell(number)
+    return stretches, ""
 
 
 def starting_state(flow: FlowMap, start: Real | None) -> Real:
@@ -483,17 +491,24 @@ def transient_end(
     omega: float,
     periods: int,
     tell: Callable[[int], None] = lambda done: None,
-) -> tuple[Real | None, str]:
-    """State z after some periods from phase zero on, or None and why; tells how many are done."""
+) -> Real:
+    """State z after some periods from phase zero on; tells how many are done.
+
+    Raises
+    ------
+    ConvergenceError
+        If it cannot be simulated.
+    """
     at_once = periods_at_once(flow, PIECE)
     for done in range(0, periods, at_once):
         count = min(periods - done, at_once)
         found = flow.at(omega, done * 2.0 * math.pi / omega).strobe(state, omega, count)
         if found.failure:
-            return None, found.failure
+            hz = omega / (2.0 * math.pi)
+            raise ConvergenceError(f"the transient at {hz:g} Hz failed: {found.failure}")
         state = found.ends[-1]
         tell(done + count)
-    return state, ""
+    return state
 
 
 def periods_at_once(flow: FlowMap, most: int) -> int:
@@ -635,23 +650,20 @@ def _swept(
     (first, last), state = case
     phases, times = chirp_steps(first, last, rate, steps)
     slope = math.copysign(rate, last - first)
-    stretches = []
-    failure = ""
-    for k in range(len(times) - 1):
-        omega = (phases[k + 1] - phases[k]) / (times[k + 1] - times[k])
-        # the phase goes with a parabola whose mean lies this much above its chord
-        above = -math.pi * slope * (times[k + 1] - times[k]) ** 2 / 6.0
-        step = np.array([phases[k], phases[k + 1]]) + above
-        step -= 2.0 * math.pi * math.floor(step[0] / (2.0 * math.pi))
-        here = flow.at(float(omega), times[k] - step[0] / omega)
-        trajectory = here.trajectory(state[None], step, float(omega))
-        failure = trajectory.failure
-        if trajectory.record.phase.size:
-            stretches.append(trajectory)
-        if failure:
-            break
-        state = end_state(trajectory)
-        tell(k + 1, len(times) - 1)
+
+    def pieces(state: Real) -> Iterator[Trajectory]:
+        for k in range(len(times) - 1):
+            omega = (phases[k + 1] - phases[k]) / (times[k + 1] - times[k])
+            # the phase goes with a parabola whose mean lies this much above its chord
+            above = -math.pi * slope * (times[k + 1] - times[k]) ** 2 / 6.0
+            step = np.array([phases[k], phases[k + 1]]) + above
+            step -= 2.0 * math.pi * math.floor(step[0] / (2.0 * math.pi))
+            here = flow.at(float(omega), times[k] - step[0] / omega)
+            trajectory = here.trajectory(state[None], step, float(omega))
+            yield trajectory
+            state = end_state(trajectory)
+
+    stretches, failure = _recorded(pieces(state), lambda number: tell(number, len(times) - 1))
     if not stretches:
         why = failure or f"{abs(last - first) / rate:g} s are too short to be simulated"
         raise ConvergenceError(f"the sweep from {first:g} Hz failed at once: {why}")

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
-
-from numpy.typing import ArrayLike
+from typing import TYPE_CHECKING, Any
 
 from nldyn.base.errors import SystemModelError, check_frequency
 from nldyn.system.loads import Excitation
-from nldyn.system.spin import Spin
 from nldyn.system.stop import Stop
 from nldyn.system.system import AnyDamper, AnySpring, System
 
@@ -94,20 +90,9 @@ class LoadCase:
 
 
 def system_of_reduced(
-    reduced: cms.ReducedModel,
-    observe: str | None,
-    rayleigh: tuple[float, float],
-    *,
-    modal_damping: float | ArrayLike,
-    stops: Sequence[Stop],
-    dampers: Sequence[AnyDamper],
-    excitation: Sequence[Excitation],
-    springs: Sequence[AnySpring] = (),
-    gyroscopic: ArrayLike | None = None,
-    circulatory: ArrayLike | None = None,
-    spin: Spin | None = None,
+    reduced: cms.ReducedModel, observe: str | None, rayleigh: tuple[float, float], **given: Any
 ) -> System:
-    """The system of a reduced model, for parameters as those of `LoadCase`.
+    """The system of a reduced model, with what `System.from_reduced` is given.
 
     Raises
     ------
@@ -116,17 +101,7 @@ def system_of_reduced(
     """
     if any(rayleigh):
         reduced = reduced.with_damping(rayleigh=rayleigh)
-    return System.from_reduced(
-        _with_first(reduced, observe) if observe else reduced,
-        modal_damping=modal_damping,
-        stops=stops,
-        dampers=dampers,
-        excitation=excitation,
-        springs=springs,
-        gyroscopic=gyroscopic,
-        circulatory=circulatory,
-        spin=spin,
-    )
+    return System.from_reduced(_with_first(reduced, observe) if observe else reduced, **given)
 
 
 def _with_first(reduced: cms.ReducedModel, observed: str) -> cms.ReducedModel:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -148,7 +149,8 @@ def render_scene(
         drawing = Drawing.of(scene, structure, folder, modes, view, tell)
         assert drawing is not None  # there is a mesh
         drawing.pages(orbit)
-        missing = drawing.draw(orbit, video)
+        pictures = drawing.deepest_contact, partial(drawing.motion, video=video)
+        missing = drawing.draw(*(partial(each, orbit) for each in pictures if orbit is not None))
     return Rendering(Path(directory), orbit, missing)
 
 
@@ -269,7 +271,8 @@ def render_modes_of(
         if drawing is None:
             return ""
         drawing.mode_page()
-        return drawing.mode_picture(against, animated)
+        pictures = [] if against is None else [partial(drawing.draw_comparison, against)]
+        return drawing.draw(*pictures, *([drawing.draw_moving_modes] if animated else []))
 
 
 def modes_in_window(
@@ -342,35 +345,16 @@ class Drawing:
             return None
         return cls(scene, drawn.component, drawn.reduced, folder, tell, tuple(modes), view)
 
-    def mode_picture(self, against: Comparison | None = None, animated: bool = False) -> str:
-        """Draw the modes, also beside others or in motion; say what is missing for it."""
+    def draw(self, *pictures: Callable[[], None]) -> str:
+        """Draw the modes and more; say what to install if something is missing for it."""
         from fem.render import RenderError, gl_available
 
         available, advice = gl_available()
         if not available:
             return advice
         try:
-            self.draw_modes()
-            if against is not None:
-                self.draw_comparison(against)
-            if animated:
-                self.draw_moving_modes()
-        except RenderError as error:
-            return str(error)
-        return ""
-
-    def draw(self, orbit: Orbit | None, video: str) -> str:
-        """Make all of them; say what to install if something is missing for it."""
-        from fem.render import RenderError, gl_available
-
-        available, advice = gl_available()
-        if not available:
-            return advice
-        try:
-            self.draw_modes()
-            if orbit is not None:
-                self.deepest_contact(orbit)
-                self.motion(orbit, video)
+            for picture in (self.draw_modes, *pictures):
+                picture()
         except RenderError as error:
             return str(error)
         return ""

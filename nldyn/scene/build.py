@@ -28,10 +28,10 @@ from nldyn.scene.load_case import load_case_of
 from nldyn.scene.matrices import build_matrices, skew_matrices
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import Scene
-from nldyn.scene.stops_and_loads import Acting, acting_elements
+from nldyn.scene.stops_and_loads import acting_elements
 from nldyn.system.loads import BaseMotion
 from nldyn.system.spin import Spin
-from nldyn.system.system import System
+from nldyn.system.system import Elements, System
 
 if TYPE_CHECKING:
     from nldyn.reduction.selection import ModeSelection
@@ -440,7 +440,7 @@ def _relative_system(scene: Scene, reduced: cms.ReducedModel | None) -> System:
                 first,
                 modal_damping=ratio,
                 loads=scene.modal.loads,
-                **acting._asdict(),
+                **acting,
             )
         if scene.matrices is not None and scene.reduction is None:
             return _unreduced(scene, build_matrices(scene), acting)
@@ -454,7 +454,7 @@ def _relative_system(scene: Scene, reduced: cms.ReducedModel | None) -> System:
             scene.observed,
             rayleigh,
             modal_damping=ratio,
-            **acting._asdict(),
+            **acting,
             **projected,
         )
 
@@ -508,7 +508,7 @@ def _spin(scene: Scene, basis: Real) -> Spin:
     )
 
 
-def _unreduced(scene: Scene, component: cms.Matrices, acting: Acting) -> System:
+def _unreduced(scene: Scene, component: cms.Matrices, acting: Elements) -> System:
     """The system of matrices that are small enough as they are."""
     assert scene.matrices is not None
     rows = component.mass.shape[0]
@@ -529,7 +529,7 @@ def _unreduced(scene: Scene, component: cms.Matrices, acting: Acting) -> System:
             loads=loads,
             spin=spin,
             **{name: skew.toarray() for name, skew in skew_matrices(scene, rows).items()},
-            **acting._asdict(),
+            **acting,
         )
 
 

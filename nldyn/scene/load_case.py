@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from nldyn.reduction.load_case import LoadCase
 from nldyn.scene.checks import check_computable
 from nldyn.scene.messages import scene_error
@@ -33,9 +35,10 @@ def load_case_of(scene: Scene) -> LoadCase:
         raise scene_error(scene.file, ("damping", "modal_ratio"), fault)
     assert scene.continuation is not None
     low, high = scene.continuation.range_hz
+    acting: dict[str, Any] = {**acting_elements(scene)}
     return LoadCase(
         (low, high),
-        **acting_elements(scene)._asdict(),
+        **acting,
         modal_damping=scene.damping.modal_ratio,
         observe=scene.observed,
         rayleigh=scene.damping.rayleigh,

@@ -149,6 +149,11 @@ def joined(faults: Sequence[tuple[KeyPath, str]]) -> tuple[KeyPath, str]:
 
 def _own_steps(model: type[BaseModel], key: KeyPath) -> KeyPath:
     """The steps of a key that are a user's, without those of pydantic into one of several types."""
+    return _walked(model, key)[0]
+
+
+def _walked(model: type[BaseModel], key: KeyPath) -> tuple[KeyPath, Any]:
+    """The steps of a key that are a user's, as far as they lead, and the type that is there."""
     here: Any = model
     steps: list[str | int] = []
     for step in key:
@@ -164,9 +169,9 @@ def _own_steps(model: type[BaseModel], key: KeyPath) -> KeyPath:
         elif get_origin(here) in (list, dict):
             here = get_args(here)[-1]
         else:
-            break
+            return tuple(steps), None
         steps.append(step)
-    return tuple(steps)
+    return tuple(steps), here
 
 
 def _tagged(annotation: Any, tag: str | int) -> Any:
@@ -263,15 +268,7 @@ def _word(name: str) -> str | None:
 
 def table_at(model: type[BaseModel], key: KeyPath) -> type[BaseModel] | None:
     """Find the table that a key path leads to."""
-    here: Any = model
-    for step in key:
-        if isinstance(here, type) and issubclass(here, BaseModel):
-            field = here.model_fields.get(str(step))
-            here = _without_none(field.annotation) if field else None
-        elif get_origin(here) in (list, dict):
-            here = get_args(here)[-1]
-        else:
-            return None
+    here = _walked(model, key)[1]
     return here if isinstance(here, type) and issubclass(here, BaseModel) else None
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,32 +15,23 @@ from nldyn.system.measured import MeasuredForce, measured_force
 from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.springs_dampers import CubicDamper, Damper, PolynomialSpring, Spring
 from nldyn.system.stop import Stop, dashpot_for, dissipation_for, hertz_stiffness
-from nldyn.system.system import AnyDamper, AnySpring
+from nldyn.system.system import AnyDamper, AnySpring, Elements
 
 logger = logging.getLogger("nldyn")
 
 
-class Acting(NamedTuple):
-    """What acts at the interfaces of a structure."""
-
-    stops: tuple[AnyStop, ...]
-    dampers: tuple[AnyDamper, ...]
-    excitation: tuple[Excitation, ...]
-    springs: tuple[AnySpring, ...]
-
-
-def acting_elements(scene: Scene) -> Acting:
+def acting_elements(scene: Scene) -> Elements:
     """The stops, dampers and excitation of a scene; a `SceneError` says what is wrong with one."""
     with told_as(scene, (), SystemModelError):
-        return Acting(
-            tuple(_stop(stop) for stop in scene.stops),
-            tuple(_damper(damper) for damper in scene.dampers),
-            tuple(
+        return Elements(
+            stops=tuple(_stop(stop) for stop in scene.stops),
+            dampers=tuple(_damper(damper) for damper in scene.dampers),
+            excitation=tuple(
                 source
                 for number, table in enumerate(scene.excitation)
                 for source in _excitation(scene, number, table)
             ),
-            tuple(_spring(spring) for spring in scene.interface_springs.values()),
+            springs=tuple(_spring(spring) for spring in scene.interface_springs.values()),
         )
 
 

@@ -1,16 +1,18 @@
 """The reference of the command line, made from the commands.
 
-``python -m nldyn.app.reference > docs/reference/commands.md`` writes it anew.
+``python docs/_site/commands.py`` writes docs/reference/commands.md anew.
 """
 
 from __future__ import annotations
 
 import inspect
+from pathlib import Path
 
 import click
 
 from nldyn.app.cli import main
 
+PAGE = Path(__file__).resolve().parents[1] / "reference" / "commands.md"
 HEAD = """# Commands
 
 Made from the commands themselves. Exit codes: 0 done, 1 no periodic orbit was found, 2 something in
@@ -54,4 +56,4 @@ def cell(text: str) -> str:
 
 
 if __name__ == "__main__":
-    print(reference(), end="")
+    PAGE.write_text(reference(), encoding="utf-8")

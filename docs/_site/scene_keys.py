@@ -1,6 +1,6 @@
 """The tables of keys in the reference of the scene file, made from the schema.
 
-``python -m nldyn.scene.reference docs/reference/scene.md`` writes them anew. What stands between
+``python docs/_site/scene_keys.py`` writes them anew in docs/reference/scene.md. What stands between
 them is written by hand.
 """
 
@@ -10,7 +10,6 @@ import ast
 import inspect
 import json
 import re
-import sys
 from collections.abc import Mapping
 from functools import cache
 from itertools import pairwise
@@ -19,6 +18,7 @@ from typing import Any
 
 from nldyn.scene import schema
 
+PAGE = Path(__file__).resolve().parents[1] / "reference" / "scene.md"
 HEAD = "| key | type | unit | default | meaning |\n|---|---|---|---|---|\n"
 TABLE = re.compile(r"^\| key \|.*\n(?:\|.*\n)+", flags=re.M)
 NAME = re.compile(r"`\[+([\w.]+)\]+`")
@@ -146,5 +146,4 @@ def with_tables(page: str) -> str:
 
 
 if __name__ == "__main__":
-    target = Path(sys.argv[1])
-    target.write_text(with_tables(target.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
