@@ -109,7 +109,7 @@ class FakeBranch:
 class FakeDiagram:
     branches: list
     notes: tuple = ()
-    range_hz: tuple = (5.0, 90.0)
+    limits: tuple = (5.0, 90.0)
     observe: str = "middle"
 
     def of_period(self, period):

@@ -12,9 +12,9 @@ import numpy as np
 from nldyn.base.errors import KeptWorkError
 from nldyn.branches.branch import Branch, Course
 from nldyn.flow.flow_map import FlowMap, same_flow
+from nldyn.orbits.axis import Axis
 from nldyn.orbits.bordered import Place
 from nldyn.runtime.keeper import Keeper
-from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
 
@@ -170,8 +170,7 @@ def checkpoint_of_several(
     place: BranchFile | None,
     finished: list[Branch],
     flow: FlowMap,
-    limits: tuple[float, float],
-    parameter: Parameter,
+    axis: Axis,
 ) -> Checkpoint:
     """The checkpoint of a computation of several branches of a system, added to a list.
 
@@ -187,9 +186,9 @@ def checkpoint_of_several(
     place.check_writable()
     earlier, tally = place.read_branches(flow.system)
     for branch in earlier:
-        same_range = branch.course is not None and branch.course.limits == limits
+        same_range = branch.course is not None and branch.course.limits == axis.limits
         same = same_flow(branch.nodes[0].family.problem.flow, flow)
-        if not (same_range and same and branch.parameter == parameter):
+        if not (same_range and same and axis.is_along(branch.nodes[0])):
             raise KeptWorkError(
                 f"{place.name}: holds branches of another system, accuracy or range; choose "
                 "another file, or delete it"

@@ -30,15 +30,15 @@ from nldyn.branches.endings import Ending, StopReason, StopReasons
 from nldyn.branches.leg import Leg, LegBuilder
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
+from nldyn.orbits.axis import chart_over
 from nldyn.orbits.bordered import FREE, OrbitFamily, Place, correct
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
 from nldyn.runtime.prefetch import Ahead
 from nldyn.runtime.progress import of_value, shows_progress
 from nldyn.runtime.threads import one_thread
-from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, told_value, value_of
+from nldyn.system.chart import FREQUENCY, Chart, told_value, value_of
 from nldyn.system.parameters import Parameter
-from nldyn.system.system import System
 
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
 MIDDLE = 0.1  # of that, within which it lies
@@ -174,14 +174,6 @@ def family_over(
             f"({chart.low:g}, {chart.high:g})"
         )
     return OrbitFamily.around(orbit, (chart,))
-
-
-def chart_over(
-    system: System, limits: tuple[float, float], parameter: str | Parameter | None = None
-) -> Chart:
-    """The chart of a parameter of a system over a range, checked; of the frequency for None."""
-    chosen = checked_parameter(system, FREQUENCY if parameter is None else parameter)
-    return Chart.of(chosen, limits)
 
 
 def extended(

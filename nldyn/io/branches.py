@@ -36,11 +36,12 @@ from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.shooting import ShootingProblem
 from nldyn.search.diagram import Diagram
 from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
-from nldyn.system.chart import FREQUENCY, Chart, checked_parameter
+from nldyn.system.chart import NAMES, THE_FREQUENCY, Chart, checked_parameter, unit_of
 from nldyn.system.parameters import Parameter
 
 FORMAT = "nldyn branches"
 FORMAT_VERSION = 3
+LIMITS = "limits", "range_hz"  # ends of a range, and what older files call them
 UNKNOWNS = f"{STATE_UNIT}; the last column: logarithm of rad/s, or the parameter's coordinate"
 RECORD_UNITS = {"phase": "rad", "duration": "s", "w": STATE_UNIT, "force": "N", "depth": "m"}
 
@@ -70,7 +71,17 @@ def save_exploration(path: str | Path, found: Exploration) -> None:
 
 
 def _of_diagram(diagram: Diagram) -> dict[str, Any]:
-    return {"range_hz": diagram.range_hz, "observe": diagram.observe, "notes": diagram.notes}
+    """What a diagram has beside its branches; of an axis that is not the frequency, that too."""
+    about = {"limits": diagram.limits, "observe": diagram.observe, "notes": diagram.notes}
+    if diagram.frequency_hz is not None:
+        about["frequency_hz"] = diagram.frequency_hz
+    if diagram.parameter != THE_FREQUENCY:
+        about |= {"parameter": diagram.parameter.name, "index": diagram.parameter.index}
+    return about
+
+
+def _is_diagram(root: Group) -> bool:
+    return any(map(root.has_attribute, LIMITS))
 
 
 def load_branches(path: str | Path, *, laws: Laws | None = None) -> list[Branch]:
@@ -82,7 +93,7 @@ def load_branches(path: str | Path, *, laws: Laws | None = None) -> list[Branch]
 def load_bare_branches(path: Path, laws: Laws) -> tuple[list[Branch], Tally | None]:
     """Read what `save_branches` wrote, of a file that holds nothing else."""
     with opened(path, FORMAT, FORMAT_VERSION) as root:
-        if root.has_attribute("range_hz"):
+        if _is_diagram(root):
             raise SystemModelError(f"{path}: holds a diagram or exploration, not branches alone")
         tally = _read_tally(root.group("search")) if "search" in root else None
         return _read_branches(root, _read_flows(root, laws)), tally
@@ -91,7 +102,7 @@ def load_bare_branches(path: Path, laws: Laws) -> tuple[list[Branch], Tally | No
 def load_diagram(path: str | Path, *, laws: Laws | None = None) -> Diagram:
     """Read a diagram with its branches."""
     with opened(path, FORMAT, FORMAT_VERSION) as root:
-        if not root.has_attribute("range_hz"):
+        if not _is_diagram(root):
             raise SystemModelError(f"{path}: holds branches without a diagram")
         return _read_diagram(root, _read_flows(root, laws))
 
@@ -201,13 +212,14 @@ def _write_exploration(group: Any, found: Exploration, flows: list[FlowMap]) -> 
     put(group, "ends", np.array(stage.ends, dtype=np.int64), "branches at each round's end")
     table = group.create_group("coverage")
     coverage = stage.coverage
-    put(table, "frequency_hz", np.array([c.frequency_hz for c in coverage], dtype=float), "Hz")
+    unit = unit_of(question.axis.parameter)
+    put(table, "value", np.array([c.value for c in coverage], dtype=float), unit)
     for name in ("settled", "unsettled", "failed"):
         put(table, name, np.array([getattr(c, name) for c in coverage], dtype=np.int64), "1")
     attractors = np.array([len(c.periods) for c in coverage], dtype=np.int64)
     periods = np.array([n for c in coverage for n in c.periods], dtype=np.int64)
     put(table, "different_periods", attractors, "1")
-    put(table, "periods", periods, "1; those of one frequency after the other")
+    put(table, "periods", periods, "1; those of one value after the other")
 
 
 def _write_tally(group: Any, tally: Tally) -> None:
@@ -285,9 +297,16 @@ def _read_branches(root: Group, flows: Sequence[FlowMap]) -> list[Branch]:
 
 
 def _read_diagram(root: Group, flows: Sequence[FlowMap]) -> Diagram:
-    range_hz, observe = root.pair("range_hz"), root.text("observe")
+    limits, observe = _limits(root), root.text("observe")
     branches = tuple(_read_branches(root, flows))
-    return Diagram(branches, range_hz, observe, tuple(root.texts("notes")))
+    parameter, held = THE_FREQUENCY, None
+    if root.has_attribute("parameter"):
+        parameter = Parameter(root.text("parameter"), root.whole("index"))
+        if parameter.name not in NAMES:
+            raise root.fault("attribute", "parameter", f"is unknown: '{parameter.name}'")
+    if root.has_attribute("frequency_hz"):
+        held = root.number("frequency_hz")
+    return Diagram(branches, limits, observe, tuple(root.texts("notes")), parameter, held)
 
 
 def _flow_of(group: Group, flows: Sequence[FlowMap]) -> FlowMap:
@@ -336,7 +355,7 @@ def _read_family(group: Group, problem: ShootingProblem, observe: str) -> OrbitF
     if "parameter" not in group:
         at = group.group("nodes").array("point", -1, problem.segments * problem.size + 1)
         low, high = _limits(group.group("course")) if "course" in group else _octave(at)
-        return OrbitFamily(problem, observe, low, (Chart(Parameter(FREQUENCY), low, high),))
+        return OrbitFamily(problem, observe, low, (Chart(THE_FREQUENCY, low, high),))
     part = group.group("parameter")
     parameter = Parameter(part.text("name"), part.whole("index"))
     low, high, unit = (part.number(key) for key in ("low", "high", "unit"))
@@ -350,8 +369,8 @@ def _octave(points: Real) -> tuple[float, float]:
     return 0.5 * float(hz.min(initial=1.0)), 2.0 * float(hz.max(initial=1.0))
 
 
-def _limits(course: Group) -> tuple[float, float]:
-    return course.pair("range_hz" if course.has_attribute("range_hz") else "limits")
+def _limits(group: Group) -> tuple[float, float]:
+    return group.pair(next((name for name in LIMITS if group.has_attribute(name)), LIMITS[0]))
 
 
 def _read_points(group: Group, family: OrbitFamily) -> list[BranchNode]:
@@ -456,7 +475,7 @@ def _read_exploration(
     efforts = {**guesses, **efforts}  # what a file does not have was not done
     question = Question(
         _flow_of(group, flows),
-        diagram.range_hz,
+        diagram.axis,
         group.whole("max_period"),
         diagram.observe,
         ExploreOptions(**efforts),
@@ -469,9 +488,9 @@ def _read_exploration(
     ends = tuple(group.array("ends", -1, kind=np.int64).tolist())
     met = group.array("met", -1, branches, kind=np.int64) > 0
     done, here, length = question.place(max(steps, 0))
-    reached = sum(len(question.frequencies(turn)) for turn in range(done)) + min(here, length // 2)
+    reached = sum(len(question.values(turn)) for turn in range(done)) + min(here, length // 2)
     if steps < 0 or len(coverage) != reached or len(ends) != done or not 0 <= len(met) - done <= 1:
-        raise group.fault("attribute", "steps", f"is {steps} with {len(coverage)} frequencies")
+        raise group.fault("attribute", "steps", f"is {steps} with {len(coverage)} values")
     for name, value, most in (
         ("branches", branches, len(diagram.branches)),
         ("notes", notes, len(diagram.notes)),
@@ -483,15 +502,15 @@ def _read_exploration(
 
 
 def _read_coverage(group: Group) -> tuple[Coverage, ...]:
-    hz = group.array("frequency_hz", -1)
+    values = group.array("value" if "value" in group else "frequency_hz", -1)
     counts = [
-        group.array(name, hz.size, kind=np.int64).tolist()
+        group.array(name, values.size, kind=np.int64).tolist()
         for name in ("settled", "unsettled", "failed")
     ]
-    different = group.array("different_periods", hz.size, kind=np.int64)
+    different = group.array("different_periods", values.size, kind=np.int64)
     periods = group.array("periods", int(different.sum()), kind=np.int64)
-    parts = np.split(periods, np.cumsum(different)[:-1]) if hz.size else []
-    rows = zip(hz.tolist(), (tuple(part.tolist()) for part in parts), *counts, strict=True)
+    parts = np.split(periods, np.cumsum(different)[:-1]) if values.size else []
+    rows = zip(values.tolist(), (tuple(part.tolist()) for part in parts), *counts, strict=True)
     return tuple(Coverage(*row) for row in rows)
 
 

@@ -128,6 +128,6 @@ def load(
         raise SystemModelError(f"{path}: is not a file of results of nldyn")
     if "exploration" in holds:
         return load_exploration(path, laws=laws)
-    if "range_hz" in holds:
+    if holds.intersection(branch_files.LIMITS):
         return load_diagram(path, laws=laws)
     return load_branches(path, laws=laws)

@@ -18,6 +18,8 @@ from nldyn.base.errors import (
 )
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.flow.rigid import before_rigid_stops
+from nldyn.orbits.axis import Section
+from nldyn.orbits.bordered import FREE, OrbitFamily, correct
 from nldyn.orbits.newton import check_bounded, refine, spread
 from nldyn.orbits.orbit import Orbit, check_observe, minimal_period, same_orbit, stroboscopic
 from nldyn.orbits.shooting import (
@@ -36,12 +38,12 @@ FEWEST, UNDAMPED = 30, 600  # periods of it: at least, and where nothing decays
 
 
 MOST_COUNT = 10**7  # of starts, periods and candidates
-FREQUENCY_WEIGHT = 10.0  # of a relative change of the frequency against one of the states
+PARAMETER_WEIGHT = 10.0  # of a relative change of the parameter against one of the states
 NEARBY = 1e-3  # a step of least length that is short enough to end with
 GUESS_ITERATIONS = 10  # Newton steps from a state that may lead nowhere
 LONG_STEPS = 0.5, 14  # of least length: the longest, and how many at most
 SHORT_STEPS = 0.1, 30  # lead to nine in ten of the orbits that 80 lead to
-FREQUENCY_SHIFT = 0.05  # how far the frequency may go, relative
+PARAMETER_SHIFT = 0.05  # how far the parameter may go, relative
 RETURNS, APART = 0.3, 0.01  # of a motion's size: to where it comes back; between two starts
 
 
@@ -222,84 +224,81 @@ def orbit_near(flow: FlowMap, start: Real, period: int, omega: float, observe: s
     return orbit
 
 
-def orbit_beside(
-    flow: FlowMap, start: Real, period: int, omega: float, observe: str
-) -> Orbit | None:
-    """Orbit beside a state z at a frequency near ω, by its minimal period; None if none is found.
+def orbit_beside(section: Section, start: Real, period: int, observe: str) -> Orbit | None:
+    """Orbit beside a state z of a section, by its minimal period; None if none is found.
 
     See `nearest_orbit`.
     """
     try:
-        nodes = spread(shooting_problem(flow, period), start, omega)
+        nodes = spread(shooting_problem(section.flow, period), start, section.omega)
     except FAILURES:
         return None
-    nodes = nodes.reshape(period, SEGMENTS_PER_PERIOD, -1)
-    return nearest_orbit(flow, nodes, omega, observe, SHORT_STEPS)
+    nodes = section.to_base(nodes.reshape(period, SEGMENTS_PER_PERIOD, -1))
+    return nearest_orbit(section, nodes, observe, SHORT_STEPS)
 
 
 def nearest_orbit(
-    flow: FlowMap, nodes: Real, omega: float, observe: str, steps: tuple[float, int]
+    section: Section, nodes: Real, observe: str, steps: tuple[float, int]
 ) -> Orbit | None:
-    """Orbit near some states at a frequency near ω, by its minimal period; None if none is found.
+    """Orbit near some states, at a value of the parameter near that of a section; None if none.
 
-    The frequency is free, and each Newton step is the shortest of those that solve the linearised
+    The parameter is free, and each Newton step is the shortest of those that solve the linearised
     equations, the Gauss-Newton method of Allgower and Georg [1990, chapter 3]. So states beside
-    a branch that does not reach ω lead to it, and folds do no harm. With more states in a period,
-    these equations hold farther.
+    a branch that does not reach the section lead to it, and folds do no harm. With more states in a
+    period, these equations hold farther. The orbit has its minimal period.
 
     Parameters
     ----------
-    flow : FlowMap
-        Of the system.
+    section : Section
+        Where the states are.
     nodes : (period, k, 2n) array
-        States z at k equidistant phases of each excitation period, a multiple of the usual number
-        of shooting segments.
-    omega : float
-        Frequency in rad/s.
+        States z, in the coordinates of the section's base, at k equidistant phases of each
+        excitation period, a multiple of the usual number of shooting segments.
     observe : str
         Interface whose displacement is reported.
     steps : (float, int)
         Longest step, over the size of the states, and how many at most.
     """
     period, count, _ = nodes.shape
-    problem = shooting_problem(flow, period)
-    finer = shooting_problem(flow, period, period * count)
+    family = section.family(shooting_problem(section.base, period), observe)
+    finer = section.family(shooting_problem(section.base, period, period * count), observe)
     try:
-        solution = _least_length_solution(finer, nodes, omega, *steps)
+        solution = _least_length_solution(finer, nodes, section.coordinate, *steps)
         if solution is None:
             return None
-        usual = [_thinned(vector, nodes.shape) for vector in solution]
-        found = problem.correct(*usual, max_iterations=FROM_NEAR)
+        point, row = (_thinned(vector, nodes.shape) for vector in solution)
+        found = correct(family, point, FREE, row, max_iterations=FROM_NEAR)
         if not found.converged:
             return None
-        orbit = Orbit.of(problem, found, observe)
+        orbit = found.orbit
     except FAILURES:
         return None
     shorter = minimal_period(orbit)
     if shorter == orbit.period:
         return orbit
+    flow = orbit.problem.flow
     return orbit_near(flow, stroboscopic(orbit)[0], shorter, orbit.omega, observe)
 
 
 def _least_length_solution(
-    problem: ShootingProblem, nodes: Real, omega: float, longest: float, most: int
+    family: OrbitFamily, nodes: Real, coordinate: float, longest: float, most: int
 ) -> tuple[Real, Real] | None:
     """Point that Newton steps of least length lead to, and the row that they fix; None if none."""
-    point = np.append(nodes.ravel(), math.log(omega))
+    point = np.append(nodes.ravel(), coordinate)
     row = np.zeros(point.size)
     row[-1] = 1.0
     for _ in range(most):
-        found = problem.correct(point, row, max_iterations=1)
+        found = correct(family, point, FREE, row, max_iterations=1)
         if not np.any(found.along):
             return None
-        metric = problem.metric(point)
-        metric[-1] *= FREQUENCY_WEIGHT
+        metric = family.metric(point)
+        metric[-1] *= PARAMETER_WEIGHT
         row = metric * found.along
         step = found.point - point
         step -= found.along * float(row @ step) / float(row @ found.along)
         length = metric_length(metric, step)
         point = point + step * min(1.0, longest / length if length else 1.0)
-        if not abs(point[-1] - math.log(omega)) < FREQUENCY_SHIFT:
+        if not abs(point[-1] - coordinate) < PARAMETER_SHIFT:
             return None
         if length < NEARBY:
             return point, row

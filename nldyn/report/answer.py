@@ -52,12 +52,12 @@ def answer_lines(
     orbits = [orbit for branch in diagram.branches for orbit in branch.points]
     if not orbits:
         return []
-    stable = joined(stable_ranges(diagram.branches), diagram.range_hz)
+    stable = joined(stable_ranges(diagram.branches), diagram.limits)
     return [
         _peak_line(orbits, diagram.observe, direction_of(diagram.observe)),
         *_contact_lines(orbits, direction_of),
         f"stable and periodic: {_listed(stable)}",
-        f"nothing stable was found: {_listed(gaps(stable, diagram.range_hz))}",
+        f"nothing stable was found: {_listed(gaps(stable, diagram.limits))}",
         f"jumps: {jumps_line(diagram.branches, special_points)}",
     ]
 

@@ -141,7 +141,7 @@ def page_content(
     content: dict[str, Any] = {
         "title": (scene.title if scene else "") or "Bifurcation diagram",
         "answer": summary.get("answer", []),
-        "range_hz": list(diagram.range_hz),
+        "range_hz": list(diagram.limits),
         "observed": displacement_of(diagram.observe, direction),
         "angle": "max_abs_displacement" in turns,
         "natural_hz": branches[0].points[0].system.frequencies_hz.tolist() if branches else [],

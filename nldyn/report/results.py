@@ -162,7 +162,7 @@ def tables_of(diagram: Diagram) -> dict[str, Table]:
 def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
     """Give the rows of ``branches.csv``, one for each point of each branch."""
     for branch in diagram.branches:
-        columns = orbit_columns(branch.points, diagram.range_hz)
+        columns = orbit_columns(branch.points, diagram.limits)
         columns["stable"] = columns["stable"].astype(int)
         rows = zip(*(columns[name].tolist() for name in BRANCH_COLUMNS[2:]), strict=True)
         for number, row in enumerate(rows):
@@ -176,7 +176,7 @@ def end_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
         for name, reason, index in ends:
             orbit = branch.points[index]
             broken = reason.broken_off or reason.ending is Ending.NOT_FINISHED
-            hz = at_known(orbit.frequency_hz, diagram.range_hz)
+            hz = at_known(orbit.frequency_hz, diagram.limits)
             size = float(orbit.max_abs_displacement)
             yield (branch.name, name, hz, size, int(broken), reason)
 
@@ -185,7 +185,7 @@ def coverage_rows(found: Exploration) -> Iterable[tuple[object, ...]]:
     """Give the rows of ``coverage.csv``, one for each frequency."""
     for c in found.coverage:
         periods = " ".join(map(str, c.periods))
-        yield (c.frequency_hz, periods, c.settled, c.unsettled, c.failed)
+        yield (c.value, periods, c.settled, c.unsettled, c.failed)
 
 
 def if_known(value: object) -> object:
@@ -233,7 +233,7 @@ def summary(diagram: Diagram) -> dict[str, object]:
         "largest_liouville_error": worst(orbit.liouville_error for orbit in orbits),
         "stability_undecided": sum(orbit.stability.verdict == "undecided" for orbit in orbits),
         "notes": list(diagram.notes),
-        "branches": [_branch_summary(branch, diagram.range_hz) for branch in diagram.branches],
+        "branches": [_branch_summary(branch, diagram.limits) for branch in diagram.branches],
         "cascades": [_cascade_summary(cascade) for cascade in cascades_in(diagram.branches)],
     }
 

@@ -13,7 +13,7 @@ from nldyn.base.errors import ConvergenceError, LocateError
 from nldyn.base.rows import Rows
 from nldyn.bifurcations.normal_forms import switch_at_branch_point
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.bifurcations.point import BranchNode, SpecialPoint, is_at
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, is_at, place_of
 from nldyn.branches.branch import Branch, Course
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.continuation import (
@@ -29,15 +29,14 @@ from nldyn.branches.continuation import (
 from nldyn.branches.endings import Ending
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
-from nldyn.orbits.bordered import OrbitFamily
+from nldyn.orbits.axis import Axis, Section
 from nldyn.orbits.orbit import Orbit, minimal_period, stroboscopic
 from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import orbit_near
 from nldyn.runtime.prefetch import Ahead, Task
 from nldyn.runtime.progress import Progress
 from nldyn.search.outlook import Outlook
-from nldyn.system.chart import FREQUENCY, Chart
-from nldyn.system.parameters import Parameter
+from nldyn.system.chart import FREQUENCY
 
 
 @dataclass
@@ -45,7 +44,7 @@ class Collector:
     """Branches found so far, with the tools to add more."""
 
     flow: FlowMap
-    range_hz: tuple[float, float]
+    axis: Axis
     observe: str
     options: ContinuationOptions
     progress: Progress
@@ -62,13 +61,19 @@ class Collector:
         default_factory=dict
     )  # of the branches born at flips, by the flips' ids
 
-    def _family_of(self, orbit: Orbit) -> OrbitFamily:
-        """The family of an orbit over the range."""
-        return OrbitFamily.around(orbit, (Chart(Parameter(FREQUENCY), *self.range_hz),))
+    def at(self, value: float) -> Section:
+        """The motions at a value of the parameter."""
+        return self.axis.at(self.flow, value)
 
-    def tell(self, what: str, frequency_hz: float) -> None:
+    def _start_of(self, orbit: Orbit) -> BranchNode:
+        """Where the branch of an orbit begins."""
+        return start_point(self.axis.family(self.flow, orbit).place(orbit), 1.0)
+
+    def tell(self, what: str, value: float) -> None:
         """Say what is being computed."""
-        self.progress(what, frequency_hz, self.done)
+        if self.axis.parameter.name != FREQUENCY:
+            what, value = f"{what} at {self.axis.told(value)}", 0.0
+        self.progress(what, value, self.done)
         if self.ahead is not None:
             self.ahead.look()
 
@@ -134,9 +139,8 @@ class Collector:
         return True
 
     def within(self, orbits: Iterable[Orbit | None]) -> list[Orbit]:
-        """Those of some orbits that were found, and whose frequencies lie within the range."""
-        low, high = self.range_hz
-        return [o for o in orbits if o is not None and low <= o.frequency_hz <= high]
+        """Those of some orbits that were found, and that lie within the range."""
+        return [o for o in orbits if o is not None and self._is_within(o)]
 
     def from_orbits(
         self, orbits: Iterable[Orbit], options: ContinuationOptions | None = None
@@ -146,7 +150,7 @@ class Collector:
             if self.known(orbit):
                 continue
             try:
-                start = start_point(self._family_of(orbit).place(orbit), 1.0)
+                start = self._start_of(orbit)
             except ConvergenceError as error:
                 self.notes.append(f"orbit of period {orbit.period} found but not followed: {error}")
             else:
@@ -158,7 +162,7 @@ class Collector:
             return
         for orbit in orbits:
             try:
-                start = start_point(self._family_of(orbit).place(orbit), 1.0)
+                start = self._start_of(orbit)
             except ConvergenceError:
                 continue
             if not self.known(start.orbit):
@@ -192,11 +196,10 @@ class Collector:
 
     def _course(self, start: BranchNode, options: ContinuationOptions | None) -> Course:
         ends = self._open_ends_like(start).so_far()
-        return Course(self.range_hz, options or self.options, ends)
+        return Course(self.axis.limits, options or self.options, ends)
 
     def _is_within(self, orbit: Orbit) -> bool:
-        low, high = self.range_hz
-        return low <= orbit.frequency_hz <= high
+        return self.axis.holds(self.axis.value(orbit))
 
     def follow(self, orbit: Orbit, longest: int, wanted: int, most: int | None) -> None:
         """Follow an orbit's branch unless it is known, and what it leads to; see `follow_up`."""
@@ -242,7 +245,7 @@ class Collector:
                 observe=orbit.observe,
                 segments=orbit.problem.segments,
             )
-            start = start_point(self._family_of(image).place(image), 1.0)
+            start = self._start_of(image)
         except ConvergenceError as error:
             self.notes.append(f"the mirror image of branch {branch.name} was not found: {error}")
         else:
@@ -283,10 +286,12 @@ class Collector:
         orbit, shorter = special.orbit, minimal_period(special.orbit)
         if shorter < orbit.period:
             state = stroboscopic(orbit)[0]
-            single = orbit_near(self.flow, state, shorter, orbit.omega, orbit.observe)
+            flow = orbit.problem.flow
+            single = orbit_near(flow, state, shorter, orbit.omega, orbit.observe)
             if single is None:
-                hz = f"{special.frequency_hz:.6g} Hz"
-                self.notes.append(f"no orbit of period {shorter} found at the branch point at {hz}")
+                place = special.place()
+                note = f"no orbit of period {shorter} found at the branch point at {place}"
+                self.notes.append(note)
             else:
                 self.from_orbits([single], options)
             return
@@ -306,7 +311,7 @@ class Collector:
         course = self._course(start, options)
         ahead = self.ahead or Ahead(self.flow)
         group = "period", start.orbit.period
-        progress(start.orbit.frequency_hz)
+        progress(start.value)
         ahead.take(group, leg_key(start, course))
         branch = self.checkpoint.branch_from(start, course)
         if branch is not None:
@@ -338,7 +343,7 @@ class Collector:
 def notes_on_ends(branch: Branch) -> list[str]:
     """Where a branch was broken off, and why."""
     return [
-        f"branch {branch.name} was broken off at {end.orbit.frequency_hz:.6g} Hz: {reason}"
+        f"branch {branch.name} was broken off at {place_of(end)}: {reason}"
         for end, reason in broken_off(branch)
     ]
 

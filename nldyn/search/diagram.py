@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 import time
 from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
@@ -16,17 +15,18 @@ from numpy.typing import NDArray
 
 from nldyn.base.errors import (
     SystemModelError,
-    check_frequency,
-    check_range,
     check_types,
     check_whole,
+    is_finite,
+    shown,
 )
 from nldyn.base.html_tables import html_table
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.branches.checkpoint import BranchFile, checkpoint_of_several
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.branches.tables import Part, to_pandas, to_xarray
-from nldyn.flow.flow_map import FlowMap, flow_of, same_flow
+from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.orbits.axis import Axis, Section
 from nldyn.orbits.newton import NO_PLACE
 from nldyn.orbits.orbit import Orbit, check_observe
 from nldyn.orbits.starts import (
@@ -41,7 +41,7 @@ from nldyn.runtime.progress import Progress, shows_progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.collector import Collector, counted
 from nldyn.search.outlook import Outlook
-from nldyn.system.chart import FREQUENCY
+from nldyn.system.chart import FREQUENCY, THE_FREQUENCY, Chart, label_of, moves_frequency
 from nldyn.system.equilibrium import at_rest, rest
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
@@ -66,57 +66,79 @@ SHIFTS = (0.0, 0.005, -0.005, 0.01, -0.01, 0.02, -0.02, 0.03, -0.03)  # relative
 
 @dataclass(frozen=True)
 class SubharmonicSeed:
-    """A frequency at which to look for orbits of one period by simulation.
+    """A frequency, or value of another parameter, at which to look for orbits of one period.
 
     Parameters
     ----------
     period : int
         Period multiple n.
-    near_hz : float
-        Excitation frequency in Hz.
+    near : float
+        Excitation frequency in Hz, or value of what the diagram is drawn over.
 
     Raises
     ------
     SystemModelError
-        For a period or frequency that makes no sense.
+        For a period or value that makes no sense.
     """
 
     period: int
-    near_hz: float
+    near: float
 
     def __post_init__(self) -> None:
         check_whole("SubharmonicSeed: period", self.period, 1)
-        check_frequency("SubharmonicSeed: near_hz", self.near_hz)
+        if not is_finite(self.near):
+            got = shown(self.near)
+            raise SystemModelError(f"SubharmonicSeed: near must be a number, got {got}")
 
 
 @dataclass(frozen=True, eq=False)
 class Diagram:
-    """Branches over a range of frequencies.
+    """Branches over a range of frequencies, or of another parameter at one frequency.
 
     Parameters
     ----------
     branches : tuple of Branch
         In the order found; names tell period and origin.
-    range_hz : (float, float)
-        The range in Hz.
+    limits : (float, float)
+        The range, in Hz or the parameter's unit.
     observe : str
         Interface whose displacement is reported.
     notes : tuple of str
         What was tried and gave nothing, and what may be missing.
+    parameter : Parameter
+        What changes along the branches.
+    frequency_hz : float, optional
+        Excitation frequency in Hz, where it is held.
     """
 
     branches: tuple[Branch, ...]
-    range_hz: tuple[float, float]
+    limits: tuple[float, float]
     observe: str
     notes: tuple[str, ...] = ()
+    parameter: Parameter = THE_FREQUENCY
+    frequency_hz: float | None = None
+
+    @classmethod
+    def of(cls, box: Collector, branches: Sequence[Branch] | None = None) -> Diagram:
+        """What a search has found: all its branches, or some of them."""
+        found, axis = box.branches if branches is None else branches, box.axis
+        return cls(
+            tuple(found), axis.limits, box.observe, tuple(box.notes), axis.parameter,
+            axis.frequency_hz,
+        )  # fmt: skip
+
+    @property
+    def axis(self) -> Axis:
+        """What changes, over which range, and what is held."""
+        return Axis(Chart(self.parameter, *self.limits), self.frequency_hz)
 
     def __repr__(self) -> str:
         """One line: range, branches, special points."""
-        low, high = self.range_hz
         special = sum(len(branch.special_points) for branch in self.branches)
         periods = ", ".join(map(str, sorted({branch.period for branch in self.branches})))
         return (
-            f"<Diagram of {low:g} to {high:g} Hz at '{self.observe}': {counted(self.branches)} of "
+            f"<Diagram of {self.axis.told_range()}, of '{self.observe}': "
+            f"{counted(self.branches)} of "
             f"period {periods or '(none)'}, {special} special points>"
         )
 
@@ -124,13 +146,13 @@ class Diagram:
         """The branches, a row each."""
         rows = []
         for branch in self.branches:
-            hz = branch.frequency_hz
-            range_hz = f"{hz.min():.6g} to {hz.max():.6g}"
+            values = branch.values
+            span = f"{values.min():.6g} to {values.max():.6g}"
             special = len(branch.special_points)
-            rows.append(
-                (branch.name, branch.period, range_hz, len(hz), special, branch.stop_reason)
-            )
-        head = ("branch", "period", "range (Hz)", "points", "special points", "ends")
+            row = (branch.name, branch.period, span, len(values), special, branch.stop_reason)
+            rows.append(row)
+        label = label_of(self.parameter)
+        head = ("branch", "period", label, "points", "special points", "ends")
         return html_table(repr(self), head, rows)
 
     def of_period(self, period: int) -> list[Branch]:
@@ -167,40 +189,50 @@ class Diagram:
 
     @property
     def _about(self) -> dict[str, Any]:
-        return {"range_hz": self.range_hz, "observe": self.observe, "notes": list(self.notes)}
+        name = "range_hz" if self.parameter.name == FREQUENCY else "range"
+        about = {name: self.limits, "observe": self.observe, "notes": list(self.notes)}
+        if self.frequency_hz is None:
+            return about
+        return {**about, "parameter": repr(self.parameter), "frequency_hz": self.frequency_hz}
 
 
-def check_known(known: Diagram, flow: FlowMap) -> None:
-    """Raise unless a diagram's branches are of this flow map and were followed over its range."""
-    low, high = check_range(known.range_hz)
+def check_known(known: Diagram, flow: FlowMap) -> Axis:
+    """The axis of a diagram; raise unless its branches are of this flow map and all along it."""
+    axis = Axis.of(flow.system, known.limits, known.parameter, known.frequency_hz)
+    low, high = axis.limits
     check_branches("known: branches", known.branches)
     check_types(**{"known: notes": (known.notes, tuple)})
     for branch in known.branches:
-        if not same_flow(branch.points[0].problem.flow, flow):
+        if not axis.is_of(flow, branch.nodes[0].family.problem.flow):
             raise SystemModelError(
                 f"known: branch '{branch.name}' is of another system or accuracy"
             )
-        if branch.parameter.name != FREQUENCY:
+        if not axis.is_along(branch.nodes[0]):
+            other, held = branch.parameter, branch.points[0].frequency_hz
+            at = "" if moves_frequency(other) else f" at {held:g} Hz"
             raise SystemModelError(
-                f"known: branch '{branch.name}' was followed in {branch.parameter.name}, not in "
-                "the frequency"
+                f"known: branch '{branch.name}' was followed in {other.name}{at}, not in "
+                f"{axis.told_held()}"
             )
         a, b = branch.course.limits if branch.course else (low, high)
         if not a <= low < high <= b:
             raise SystemModelError(
-                f"known: branch '{branch.name}' was followed from {a:g} to {b:g} Hz, not over the "
-                f"range of the diagram, {low:g} to {high:g} Hz"
+                f"known: branch '{branch.name}' was followed from {axis.told_span(a, b)}, not over "
+                f"the range of the diagram, {axis.told_span(low, high)}"
             )
     check_observe(flow.system, known.observe)
+    return axis
 
 
 @one_thread()
 @shows_progress()
 def diagram(
     system: System | FlowMap,
-    range_hz: tuple[float, float],
+    limits: tuple[float, float],
     periods: Sequence[int] = (1, 2, 3),
     *,
+    parameter: str | Parameter | None = None,
+    frequency_hz: float | None = None,
     seeds: Sequence[SubharmonicSeed] = (),
     search_points: int = 12,
     doublings: int = 0,
@@ -212,11 +244,11 @@ def diagram(
     jobs: int = 1,
     executor: Executor | None = None,
 ) -> Diagram:
-    """Compute the branches of the wanted periods over a range of frequencies.
+    """Compute the branches of the wanted periods over a range of frequencies or another parameter.
 
-    Orbits of each period are looked for by simulation at `search_points` frequencies and at the
-    seeds, continued in both directions, and at each flip the doubled branch is followed when its
-    period is wanted. At a branch point the other branch is followed both ways; where a symmetry
+    Orbits of each period are looked for by simulation at `search_points` values and at the seeds,
+    continued in both directions, and at each flip the doubled branch is followed when its period is
+    wanted. At a branch point the other branch is followed both ways; where a symmetry
     breaks, these are its two halves. If the stops are open at rest and no orbit found touches one,
     the search is repeated once with four times as many initial states. What no simulation comes
     near (isolas of unstable orbits, say) is missed.
@@ -225,14 +257,20 @@ def diagram(
     ----------
     system : System or FlowMap
         What to compute.
-    range_hz : (float, float)
-        Frequencies in Hz, ascending.
+    limits : (float, float)
+        Frequencies in Hz, or values of the parameter, ascending.
     periods : sequence of int
         Period multiples wanted; may be empty when there are seeds.
+    parameter : str or Parameter, optional
+        What changes, the excitation frequency unless given: see
+        `nldyn.system.chart.checked_parameter`.
+    frequency_hz : float, optional
+        Excitation frequency in Hz, held where another parameter changes.
     seeds : sequence of SubharmonicSeed
-        Further frequencies at which to look for a period (which need not be in `periods`).
+        Further values at which to look for a period (which need not be in `periods`).
     search_points : int
-        Number of frequencies searched, equally spaced on a logarithmic axis.
+        Number of values searched, equally spaced on the parameter's scale: a logarithmic one if the
+        range is positive.
     doublings : int
         How many doublings to follow at flips whose doubled period is not in `periods`.
     observe : str, optional
@@ -240,7 +278,7 @@ def diagram(
     options, search : optional
         Step control and search effort.
     progress : callable, optional
-        Called as ``progress(what, frequency_hz, done)``.
+        Called as ``progress(what, frequency_hz, done)``, the frequency zero where it is held.
     checkpoint : CheckpointFile, optional
         File that keeps the branches computed so far, as for `continue_branch`. If it exists, the
         simulations are repeated, but of the branches only what is not in it is computed; those that
@@ -274,9 +312,13 @@ def diagram(
     >>> found = diagram(system, (8.5, 9.0), (1, 2), search_points=1, search=one)
     >>> sorted(branch.period for branch in found.branches)
     [1, 2]
+    >>> found = diagram(system, (0.0, 1e-5), [1], parameter="gap", frequency_hz=8.7,
+    ...     search_points=1, search=one)
+    >>> found
+    <Diagram of gap = 0 to 1e-05 m at 8.7 Hz, of 'middle': 1 branch of period 1, 0 special points>
     """
     flow = flow_of(system)
-    low, high = check_range(range_hz)
+    axis = Axis.of(flow.system, limits, parameter, frequency_hz)
     check_types(
         periods=(periods, Sequence),
         seeds=(seeds, Sequence),
@@ -286,24 +328,21 @@ def diagram(
         executor=(executor, Executor, None),
     )
     check_whole("jobs", jobs, 1, MOST_JOBS)
-    wanted = _checked_periods(periods, seeds, (low, high))
+    wanted = _checked_periods(periods, seeds, axis)
     check_whole("search_points", search_points, 1, MOST_COUNT)
     check_whole("doublings", doublings, 0, MOST_COUNT)
     box = Collector(
         flow,
-        (low, high),
+        axis,
         check_observe(flow.system, observe),
         options or ContinuationOptions(),
         progress or silent,
     )
-    box.checkpoint = checkpoint_of_several(
-        checkpoint, box.branches, flow, (low, high), Parameter(FREQUENCY)
-    )
+    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, axis)
     with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
         effort, whole = _effort(box, search, search_points, wanted)
         box.outlook = Outlook(wanted, search_points if wanted else 0, len(seeds))
-        edges = np.geomspace(low, high, search_points + 1)
-        places = np.sqrt(edges[:-1] * edges[1:])[::-1].tolist() if wanted else []
+        places = axis.middles(search_points)[::-1] if wanted else []
         _search(box, places, wanted, effort)
         if places and whole and _contact_is_missing(box):
             more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
@@ -315,11 +354,11 @@ def diagram(
         for branch in box.branches:  # which become more
             box.from_mirror(branch, box.options)
     _note_missing(box, wanted, search_points)
-    return Diagram(tuple(box.branches), (low, high), box.observe, tuple(box.notes))
+    return Diagram.of(box)
 
 
 def _checked_periods(
-    periods: Sequence[int], seeds: Sequence[SubharmonicSeed], range_hz: tuple[float, float]
+    periods: Sequence[int], seeds: Sequence[SubharmonicSeed], axis: Axis
 ) -> list[int]:
     """The periods wanted, ascending; seeds must lie in the range."""
     for seed in seeds:
@@ -328,11 +367,12 @@ def _checked_periods(
         check_whole("periods: each", period, 1)
     if not (periods or seeds):
         raise SystemModelError("periods must not be empty when there are no seeds")
-    low, high = range_hz
+    low, high = axis.limits
     for seed in seeds:
-        if not low <= seed.near_hz <= high:
+        if not low <= seed.near <= high:
             raise SystemModelError(
-                f"seeds: near_hz = {seed.near_hz:g} lies outside range_hz ({low:g}, {high:g})"
+                f"seeds: near = {seed.near:g} lies outside {axis.chart.range_name} "
+                f"({low:g}, {high:g})"
             )
     return sorted(set(periods))
 
@@ -345,13 +385,13 @@ def _effort(
         return search, True
     effort = OrbitSearchOptions()
     if wanted:
-        low, high = box.range_hz
-        effort = shortened(box.flow, effort, (low * high) ** 0.5, search_points, wanted)
+        middle = box.at(box.axis.between(*box.axis.limits, 0.5))
+        effort = shortened(middle, effort, search_points, wanted)
     whole = effort == OrbitSearchOptions()
     if not whole:
         box.notes.append(
             f"periods take many contacts of {box.flow.system.size} modes: the search was shortened "
-            f"to {effort.starts} motions of {effort.recorded} periods at each frequency; "
+            f"to {effort.starts} motions of {effort.recorded} periods at each {box.axis.noun}; "
             "nldyn.diagram(..., search=OrbitSearchOptions()) does all of it"
         )
     return effort, whole
@@ -361,7 +401,7 @@ def _note_missing(box: Collector, wanted: Sequence[int], search_points: int) -> 
     """What was looked for and not found."""
     for period in wanted:
         if not any(branch.period == period for branch in box.branches):
-            tried = f"{search_points} frequenc{'y' if search_points == 1 else 'ies'}"
+            tried = box.axis.counted(search_points)
             box.notes.append(f"no orbit of period {period} found by simulation at {tried}")
     if not box.branches and box.flow.system.free_modes:
         box.notes.append(NO_PLACE)
@@ -373,12 +413,12 @@ def _note_missing(box: Collector, wanted: Sequence[int], search_points: int) -> 
 
 
 def _search(
-    box: Collector, frequencies: Sequence[float], periods: Sequence[int], effort: OrbitSearchOptions
+    box: Collector, values: Sequence[float], periods: Sequence[int], effort: OrbitSearchOptions
 ) -> None:
-    """Follow what simulations at some frequencies come near, one period after the other."""
-    found = _searched(box, frequencies, periods, effort)
-    for frequency, (failures, _) in zip(frequencies, found, strict=True):
-        _note_failures(box, frequency, failures, effort)
+    """Follow what simulations at some values come near, one period after the other."""
+    found = _searched(box, values, periods, effort)
+    for value, (failures, _) in zip(values, found, strict=True):
+        _note_failures(box, value, failures, effort)
     for period in periods:
         if period not in box.outlook.doubled:
             box.offer_orbits(orbit for _, of_period in found for orbit in of_period[period])
@@ -393,61 +433,62 @@ def _search(
 
 
 def _searched(
-    box: Collector, frequencies: Sequence[float], periods: Sequence[int], effort: OrbitSearchOptions
+    box: Collector, values: Sequence[float], periods: Sequence[int], effort: OrbitSearchOptions
 ) -> list[Found]:
-    """What simulations at some frequencies come near, on all processes."""
+    """What simulations at some values come near, on all processes."""
     ahead = box.ahead or Ahead(box.flow)
 
     counts = Counter({period: int(box.outlook.reached[f"1/{period}"]) for period in periods})
 
     def told(done: int, found: Found) -> None:
-        box.outlook.searched(frequencies, done)
+        box.outlook.searched([box.at(value).frequency_hz for value in values], done)
         box.done = box.outlook.done
         for period, orbits in found[1].items():
             counts[period] += len(orbits)
             if done > 1:
-                box.outlook.found(period, counts[period] * len(frequencies) / done)
-        box.tell("search", frequencies[done - 1])
+                box.outlook.found(period, counts[period] * len(values) / done)
+        box.tell("search", values[done - 1])
 
-    if frequencies:
-        box.tell("search", frequencies[0])
-    arguments = [(frequency, tuple(periods), box.observe, effort) for frequency in frequencies]
+    if values:
+        box.tell("search", values[0])
+    arguments = [(box.axis, value, tuple(periods), box.observe, effort) for value in values]
     keys = [("search", *given) for given in arguments]
     return ahead.values(keys, search_at, arguments, told)
 
 
 def search_at(
     flow: FlowMap,
-    frequency_hz: float,
+    axis: Axis,
+    value: float,
     periods: Sequence[int],
     observe: str,
     effort: OrbitSearchOptions,
     look: Callable[[], None] | None = None,
 ) -> Found:
-    """Why simulations at a frequency failed, and the orbits of some periods that others pass."""
-    strobe = simulate_strobe(flow, frequency_hz, effort)
-    orbits = {p: orbits_from_strobe(flow, strobe, p, observe, effort) for p in periods}
+    """Why simulations at a value failed, and the orbits of some periods that others pass."""
+    here = axis.at(flow, value)
+    strobe = simulate_strobe(here.flow, here.frequency_hz, effort)
+    orbits = {p: orbits_from_strobe(here.flow, strobe, p, observe, effort) for p in periods}
     return strobe.failures, orbits
 
 
 def _note_failures(
-    box: Collector, frequency_hz: float, failures: Sequence[str], effort: OrbitSearchOptions
+    box: Collector, value: float, failures: Sequence[str], effort: OrbitSearchOptions
 ) -> None:
     for reason, count in Counter(failures).items():
-        box.notes.append(
-            f"{count} of {effort.starts} simulations at {frequency_hz:.6g} Hz failed: {reason}"
-        )
+        place = box.axis.told(value)
+        box.notes.append(f"{count} of {effort.starts} simulations at {place} failed: {reason}")
 
 
 def shortened(
-    flow: FlowMap, effort: OrbitSearchOptions, hz: float, points: int, periods: Sequence[int]
+    section: Section, effort: OrbitSearchOptions, points: int, periods: Sequence[int]
 ) -> OrbitSearchOptions:
     """The effort of a search that takes minutes where the whole one would take hours.
 
-    Its work goes with the flights and contact panels of a period, counted at one frequency in Hz,
-    and the square of the number of coordinates.
+    Its work goes with the flights and contact panels of a period, counted at one section, and the
+    square of the number of coordinates.
     """
-    omega = 2.0 * math.pi * hz
+    flow, omega = section.flow, section.omega
     start = flow.to_state(at_rest(rest(flow.system)))
     before = flow.strobe(start, omega, PROBED)
     begun = time.process_time()
@@ -495,31 +536,31 @@ def _follow_seeds(
         box.reach("seeds", number)
         if number == 1 and box.ahead is not None:  # which has compiled what the others need
             for other in seeds[1:]:
-                key, given = _seed_task(box, other, other.near_hz, effort)
+                key, given = _seed_task(box, other, other.near, effort)
                 box.ahead.offer(key, search_at, *given)
 
 
 def _follow_seed(box: Collector, seed: SubharmonicSeed, effort: OrbitSearchOptions) -> None:
-    """Look around a seed's frequency, nearest first, until a new branch turns up."""
+    """Look around a seed, nearest first, until a new branch turns up."""
     for shift in SHIFTS:
-        frequency = seed.near_hz * (1.0 + shift)
-        if not box.range_hz[0] <= frequency <= box.range_hz[1]:
+        value = box.axis.moved(seed.near, shift)
+        if not box.axis.holds(value):
             continue
-        box.tell(f"search 1/{seed.period}", frequency)
-        key, given = _seed_task(box, seed, frequency, effort)
+        box.tell(f"search 1/{seed.period}", value)
+        key, given = _seed_task(box, seed, value, effort)
         ahead = box.ahead or Ahead(box.flow)
         failures, found = ahead.value(key, search_at, *given)
-        _note_failures(box, frequency, failures, effort)
+        _note_failures(box, value, failures, effort)
         if orbits := found[seed.period]:
             box.from_orbits(orbits)
             return
-    box.notes.append(f"no 1/{seed.period} orbit found near {seed.near_hz:g} Hz")
+    box.notes.append(f"no 1/{seed.period} orbit found near {box.axis.told(seed.near)}")
 
 
 def _seed_task(
-    box: Collector, seed: SubharmonicSeed, frequency_hz: float, effort: OrbitSearchOptions
+    box: Collector, seed: SubharmonicSeed, value: float, effort: OrbitSearchOptions
 ) -> tuple[Hashable, tuple[Any, ...]]:
-    given = (frequency_hz, (seed.period,), box.observe, effort)
+    given = (box.axis, value, (seed.period,), box.observe, effort)
     return ("search", *given), given
 
 

@@ -16,17 +16,18 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.branches.step_control import MOST_POINTS, ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, same_flow
+from nldyn.orbits.axis import Axis
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import MOST_COUNT, settling_periods
 from nldyn.search.collector import counted
 from nldyn.search.diagram import Diagram
-from nldyn.search.fixed_point_index import index_note, is_damped
+from nldyn.search.fixed_point_index import index_note, is_damped_along
 
 FINEST_SPACING = 1e-6
 MOST_NUMBERS = 10**7  # of counts of closed walks: states times the longest period
 CAN_BE_MISSING = (
     "may be missing all the same: isolas that no motion came near, and what is stable in small "
-    "basins or between two frequencies; another seed, more rounds "
+    "basins or between two values; another seed, more rounds "
     "or extend_diagram may find them"
 )
 
@@ -38,8 +39,9 @@ class ExploreOptions:
     Parameters
     ----------
     spacing : float
-        Largest relative distance of the frequencies at which motions are simulated. A branch that
-        is stable only in a narrower window may be missed.
+        Largest relative distance of the frequencies at which motions are simulated, or of other
+        values; where their range is not positive, the share of its width. A branch that is stable
+        only in a narrower window may be missed.
     starts : int
         Initial states at each of them, rest and random ones, beside the motions of the frequency
         before.
@@ -109,12 +111,12 @@ class ExploreOptions:
 
 @dataclass(frozen=True)
 class Coverage:
-    """What simulations at one frequency came to.
+    """What simulations at one frequency, or another value, came to.
 
     Parameters
     ----------
-    frequency_hz : float
-        Excitation frequency in Hz.
+    value : float
+        Excitation frequency in Hz, or value of the parameter.
     periods : tuple of int
         Period multiples of the different attractors found, ascending.
     settled, unsettled, failed : int
@@ -122,7 +124,7 @@ class Coverage:
         periods or slow transients), and that could not be computed.
     """
 
-    frequency_hz: float
+    value: float
     periods: tuple[int, ...]
     settled: int
     unsettled: int
@@ -131,7 +133,7 @@ class Coverage:
     def with_more(self, other: Coverage) -> Coverage:
         """Both together."""
         return Coverage(
-            self.frequency_hz,
+            self.value,
             tuple(sorted({*self.periods, *other.periods})),
             self.settled + other.settled,
             self.unsettled + other.unsettled,
@@ -147,8 +149,8 @@ class Question:
     ----------
     flow : FlowMap
         Of the system.
-    range_hz : (float, float)
-        Frequencies in Hz.
+    axis : Axis
+        What changes, over which range.
     max_period : int
         Longest orbits looked for.
     observe : str
@@ -160,39 +162,37 @@ class Question:
     """
 
     flow: FlowMap
-    range_hz: tuple[float, float]
+    axis: Axis
     max_period: int
     observe: str
     effort: ExploreOptions
     options: ContinuationOptions
 
-    def frequencies(self, turn: int) -> list[float]:
-        """Frequencies in Hz at which a round simulates motions, ascending.
+    def values(self, turn: int) -> list[float]:
+        """Frequencies in Hz, or other values, at which a round simulates motions, ascending.
 
         Between two neighbours of the first round, the shares of the way at which the further ones
         lie are van der Corput's sequence 1/2, 1/4, 3/4, 1/8, ...: each fills the largest gaps.
         """
-        low, high = self.range_hz
-        steps = steps_between(low, high, self.effort.spacing)
-        found: list[float] = np.geomspace(low, high, steps + 1).tolist()
+        found: list[float] = self.axis.spread(self.axis.steps(self.effort.spacing) + 1).tolist()
         if turn == 0:
             return found
         share, weight = 0.0, 0.5
         while turn:
             share, weight, turn = share + weight * (turn % 2), 0.5 * weight, turn // 2
-        return [a * (b / a) ** share for a, b in pairwise(found)]
+        return [self.axis.between(a, b, share) for a, b in pairwise(found)]
 
     def place(self, steps: int) -> tuple[int, int, int]:
         """Round in which some steps have ended, how many of them belong to it, and its length."""
         turn = 0
-        while steps >= (length := 2 * len(self.frequencies(turn))):
+        while steps >= (length := 2 * len(self.values(turn))):
             turn, steps = turn + 1, steps - length
         return turn, steps, length
 
     def same(self, other: Question) -> bool:
         """Whether another question is this one, but for the number of rounds."""
         mine, its = (
-            (q.range_hz, q.max_period, q.observe, replace(q.effort, rounds=1), q.options)
+            (q.axis, q.max_period, q.observe, replace(q.effort, rounds=1), q.options)
             for q in (self, other)
         )
         return mine == its and same_flow(self.flow, other.flow)
@@ -251,11 +251,11 @@ class Exploration:
 
     def __repr__(self) -> str:
         """One line: branches, and the share of simulated motions that they explain."""
-        low, high = self.question.range_hz
         count = len(self.diagram.branches)
         share = f"{100.0 * self.settled_share:.1f} % of simulated motions explained"
         ended = "" if self.finished else ", not finished"
-        return f"<Exploration of {low:g} to {high:g} Hz: {count} branches, {share}{ended}>"
+        told = self.question.axis.told_range()
+        return f"<Exploration of {told}: {count} branches, {share}{ended}>"
 
     @property
     def coverage(self) -> tuple[Coverage, ...]:
@@ -314,26 +314,26 @@ class Exploration:
             "harmonic" if branch.period == 1 else f"1/{branch.period}"
             for branch in self.diagram.branches
         )
-        low, high = self.diagram.range_hz
         found = ", ".join(f"{n} {kind}" for kind, n in counts.items()) or "none"
-        first = f"{low:g} to {high:g} Hz: {counted(self.diagram.branches)} ({found})"
+        told = self.question.axis.told_range()
+        first = f"{told}: {counted(self.diagram.branches)} ({found})"
         return "\n".join([first, *self.coverage_lines(), *self.diagram.notes])
 
     def coverage_lines(self) -> list[str]:
         """What was tried and left unexplained, line by line."""
         simulations = sum(c.settled + c.unsettled + c.failed for c in self.coverage)
-        lines = []
+        lines, axis = [], self.question.axis
         if simulations:
             lines.append(
-                f"{simulations} simulations at {len(self.coverage)} frequencies, "
+                f"{simulations} simulations at {axis.counted(len(self.coverage))}, "
                 f"{100.0 * self.settled_share:.1f} % ended on one of the branches"
             )
         failed = [c for c in self.coverage if c.failed]
         if failed:
             lines.append(
                 f"{sum(c.failed for c in failed)} simulations could not be computed, at "
-                f"{len(failed)} frequencies from {failed[0].frequency_hz:.4g} to "
-                f"{failed[-1].frequency_hz:.4g} Hz"
+                f"{axis.counted(len(failed))} from "
+                f"{axis.told_span(failed[0].value, failed[-1].value, digits=4)}"
             )
         if not self.finished:
             turn, steps, length = self.question.place(self.stage.steps)
@@ -341,13 +341,11 @@ class Exploration:
                 f"not finished: {steps} of {length} steps up and down of round {turn + 1} are done"
             )
         lines += self._rounds()
-        open_ranges = ", ".join(
-            f"{a:.4g}-{b:.4g}" if a < b else f"{a:.4g}" for a, b in self.unsettled_ranges()
-        )
+        open_ranges = self.unsettled_ranges()
         if open_ranges:
             lines.append(
                 f"motions that did not settle (chaos, longer periods or slow decay): "
-                f"{open_ranges} Hz"
+                f"{axis.told_ranges(open_ranges)}"
             )
         tried = self._unstable() + self._beside() + self._cut()
         return lines + tried + self._indices + [CAN_BE_MISSING]
@@ -394,40 +392,43 @@ class Exploration:
         }
         return [
             f"beside {what} of each length up to {longest} orbits were looked for at each "
-            "frequency on the way down"
+            f"{self.question.axis.noun} on the way down"
             for what, count in guesses.items()
             if count
         ]
 
     def _cut(self) -> list[str]:
         """Where the motions had less time to settle than the damping asks for."""
-        system, limit = self.question.flow.system, self.question.effort.settling
-        needed = [(settling_periods(system, c.frequency_hz), c.frequency_hz) for c in self.coverage]
-        cut = [hz for periods, hz in needed if periods > limit]
+        axis, flow, limit = self.question.axis, self.question.flow, self.question.effort.settling
+        here = [axis.at(flow, c.value) for c in self.coverage]
+        needed = [(settling_periods(at.flow.system, at.frequency_hz), at.value) for at in here]
+        cut = [value for periods, value in needed if periods > limit]
         if not cut:
             return []
+        span = axis.told_span(cut[0], cut[-1], digits=4)
         return [
-            f"settling was cut at {limit} periods from {cut[0]:.4g} to {cut[-1]:.4g} Hz; the "
-            f"slowest motion takes up to {max(needed)[0]} there"
+            f"settling was cut at {limit} periods from {span}; the slowest motion takes up to "
+            f"{max(needed)[0]} there"
         ]
 
     @cached_property
     def _indices(self) -> list[str]:
         """Whether orbits are missing for certain, where unstable ones were looked for as well."""
         longest = min(self.question.effort.unstable_period, self.question.max_period)
-        if not (longest and self.finished and is_damped(self.question.flow.system)):
+        axis = self.question.axis
+        if not (longest and self.finished and is_damped_along(axis, self.question.flow)):
             return []
-        return [index_note(self.diagram.branches, self.diagram.range_hz, longest)]
+        return [index_note(self.diagram.branches, axis, longest)]
 
     def unsettled_ranges(self) -> list[tuple[float, float]]:
-        """Ranges of neighbouring frequencies in Hz at which some simulations did not settle."""
+        """Ranges of neighbouring frequencies in Hz, or values, where simulations did not settle."""
         ranges: list[tuple[float, float]] = []
         before = False
         for c in self.coverage:
             if c.unsettled and before:
-                ranges[-1] = (ranges[-1][0], c.frequency_hz)
+                ranges[-1] = (ranges[-1][0], c.value)
             elif c.unsettled:
-                ranges.append((c.frequency_hz, c.frequency_hz))
+                ranges.append((c.value, c.value))
             before = c.unsettled > 0
         return ranges
 
@@ -468,8 +469,3 @@ def check_spacing(name: str, spacing: object) -> None:
 def check_walk_states(name: str, states: object, longest: int) -> None:
     """Raise unless closed walks up to a period may be made among so many states."""
     check_whole(name, states, 1, MOST_NUMBERS // longest)
-
-
-def steps_between(low: float, high: float, spacing: float) -> int:
-    """Number of equal ratios, at most 1 + spacing, from a low frequency to a high one."""
-    return math.ceil(math.log(high / low) / math.log1p(spacing))

@@ -16,7 +16,6 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import (
     KeptWorkError,
     SystemModelError,
-    check_range,
     check_types,
     check_whole,
     shown,
@@ -25,6 +24,7 @@ from nldyn.branches.branch import Branch
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.orbits.axis import Axis, Section
 from nldyn.orbits.deflation import deflated_orbit
 from nldyn.orbits.orbit import Orbit, check_observe, same_orbit, stroboscopic
 from nldyn.orbits.shooting import LONGEST_PERIOD
@@ -46,6 +46,7 @@ from nldyn.search.fixed_point_index import is_damped, sum_of_indices, without_in
 from nldyn.search.mixtures import Mixtures
 from nldyn.search.pseudo_orbits import PseudoOrbits
 from nldyn.search.random_walks import ClosedWalks
+from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
 RETURNS = 3.0  # recorded periods after settling, over the longest period looked for
@@ -83,9 +84,11 @@ class ExplorationFile(Protocol):
 @shows_progress()
 def explore(
     system: System | FlowMap,
-    range_hz: tuple[float, float],
+    limits: tuple[float, float],
     max_period: int = 8,
     *,
+    parameter: str | Parameter | None = None,
+    frequency_hz: float | None = None,
     observe: str | None = None,
     effort: ExploreOptions | None = None,
     options: ContinuationOptions | None = None,
@@ -95,10 +98,11 @@ def explore(
     jobs: int = 1,
     executor: Executor | None = None,
 ) -> Exploration:
-    """Find the branches of periodic orbits in a range of frequencies, without initial guesses.
+    """Find the branches of periodic orbits over a range, without initial guesses.
 
-    Motions are simulated at many frequencies from random states and swept up and down, each
-    frequency starting from the attractors of the one before. What they settle on is solved for as
+    The range is one of frequencies, or of another parameter at one frequency. Motions are simulated
+    at many of its values from random states and swept up and down, each value starting from the
+    attractors of the one before. What they settle on is solved for as
     an orbit, and its branch continued in both directions unless it is known. Unstable orbits come
     from near returns of motions that wander, from Newton's method deflated by the known orbits
     [Farrell, Birkisson and Funke 2015], and from flips, at each of which the doubled branch is
@@ -113,10 +117,12 @@ def explore(
     ----------
     system : System or FlowMap
         What to explore.
-    range_hz : (float, float)
-        Frequencies in Hz, ascending.
+    limits : (float, float)
+        Frequencies in Hz, or values of the parameter, ascending.
     max_period : int
         Longest orbits wanted, in excitation periods.
+    parameter, frequency_hz : optional
+        What changes, and the excitation frequency in Hz where that is held, see `diagram`.
     observe : str, optional
         Interface whose displacement is reported; the first unless given.
     effort : ExploreOptions, optional
@@ -165,11 +171,11 @@ def explore(
         executor=(executor, Executor, None),
     )
     check_whole("jobs", jobs, 1, MOST_JOBS)
-    low, high = check_range(range_hz)
+    axis = Axis.of(flow.system, limits, parameter, frequency_hz)
     check_whole("max_period", max_period, 1, LONGEST_PERIOD)
     question = Question(
         flow,
-        (low, high),
+        axis,
         max_period,
         check_observe(flow.system, observe),
         effort or ExploreOptions(),
@@ -177,13 +183,12 @@ def explore(
     )
     box = Collector(
         flow,
-        question.range_hz,
+        axis,
         question.observe,
         question.options,
         progress or silent,
     )
-    if known is None:
-        known = Diagram((), question.range_hz, question.observe, ())
+    known = known or Diagram.of(box)
     _check_known(known, question)
     known = replace(known, notes=tuple(without_index_note(known.notes)))
     survey = _Survey(box, question, known)
@@ -209,12 +214,10 @@ def strategies_of(effort: ExploreOptions) -> list[tuple[int, Strategy]]:
 
 def _check_known(known: Diagram, question: Question) -> None:
     """Raise unless branches that are known belong to the question."""
-    check_known(known, question.flow)
-    if tuple(known.range_hz) != question.range_hz:
-        (a, b), (low, high) = known.range_hz, question.range_hz
-        raise SystemModelError(
-            f"known: is of {a:g} to {b:g} Hz, but {low:g} to {high:g} Hz are to be explored"
-        )
+    axis = check_known(known, question.flow)
+    if axis != question.axis:
+        told = axis.told_range(), question.axis.told_range()
+        raise SystemModelError(f"known: is of {told[0]}, but {told[1]} are to be explored")
     if known.observe != question.observe:
         raise SystemModelError(
             f"known: observes {shown(known.observe)}, not {shown(question.observe)}"
@@ -227,7 +230,7 @@ def _same_branches(a: Diagram, b: Diagram) -> bool:
         a.notes == b.notes
         and len(a.branches) == len(b.branches)
         and all(
-            np.array_equal(one.frequency_hz, other.frequency_hz)
+            np.array_equal(one.values, other.values)
             and np.array_equal(one.nodes[0].orbit.point, other.nodes[0].orbit.point)
             for one, other in zip(a.branches, b.branches, strict=True)
         )
@@ -235,7 +238,7 @@ def _same_branches(a: Diagram, b: Diagram) -> bool:
 
 
 class _Survey:
-    """Simulations over frequencies that fill a box of branches."""
+    """Simulations over a range that fill a box of branches."""
 
     def __init__(self, box: Collector, question: Question, known: Diagram) -> None:
         self.box, self.question, self.known = box, question, known
@@ -284,45 +287,44 @@ class _Survey:
 
     def so_far(self, branches: Sequence[Branch]) -> Exploration:
         """What the steps that are done have come to, with branches found since then too."""
-        box = self.box
-        diagram = Diagram(tuple(branches), box.range_hz, box.observe, tuple(box.notes))
-        return Exploration(diagram, self.question, self.stage)
+        return Exploration(Diagram.of(self.box, branches), self.question, self.stage)
 
     def step(self) -> None:
-        """Simulate at the next frequency, from what came before and, going up, random states."""
-        box, flow, stage = self.box, self.box.flow, self.stage
+        """Simulate at the next value, from what came before and, going up, random states."""
+        box, stage = self.box, self.stage
         turn, place, length = self.question.place(stage.steps)
         up, last = place < length // 2, place == length - 1
-        frequency = self.question.frequencies(turn)[place if up else length - 1 - place]
+        here = box.at(self.question.values(turn)[place if up else length - 1 - place])
         box.done = self._share_done()
-        box.tell("explore", frequency)
-        omega = 2.0 * math.pi * frequency
+        box.tell("explore", here.value)
         if stage.steps == 0:
             box.follow_up(0, *self._depth)
-        starts = stage.carried
+        starts = here.taken_over(stage.carried)
         if up:
             seed: tuple[int, ...] = (self.effort.seed, turn, place)
-            starts = np.vstack([starts, random_states(flow, omega, self.effort.starts, seed)])
-        known = _Known(box, frequency)
-        here, carried = self._search(starts, known, also_unstable=up)
+            more = random_states(here.flow, here.omega, self.effort.starts, seed)
+            starts = np.vstack([starts, more])
+        known = _Known(box, here)
+        coverage, carried = self._search(starts, known, also_unstable=up)
         for again in range(AGAIN if up else 0):
             if not known.incomplete(min(self.effort.unstable_period, self.max_period)):
                 break
             seed = (self.effort.seed, turn, place, again + 1)
-            starts = random_states(flow, omega, self.effort.starts + 1, seed)[1:]  # without rest
-            here = here.with_more(self._search(starts, known, also_unstable=True)[0])
+            starts = random_states(here.flow, here.omega, self.effort.starts + 1, seed)[1:]
+            coverage = coverage.with_more(self._search(starts, known, also_unstable=True)[0])
         if not up and self.effort.unstable_period:
-            self._follow_guesses(frequency, (self.effort.seed, turn, place))
-        both = {c.frequency_hz: c for c in stage.coverage}
-        both[frequency] = both[frequency].with_more(here) if frequency in both else here
+            self._follow_guesses(here, (self.effort.seed, turn, place))
+        both = {c.value: c for c in stage.coverage}
+        earlier = both.get(here.value)
+        both[here.value] = earlier.with_more(coverage) if earlier else coverage
         met = self._met(turn + 1)
         met[turn, known.met] = True
         self.stage = Stage(
             stage.steps + 1,
             len(box.branches),
             len(box.notes),
-            np.array(carried).reshape(-1, 2 * flow.system.size),
-            tuple(both[hz] for hz in sorted(both)),
+            here.to_base(np.array(carried).reshape(-1, 2 * box.flow.system.size)),
+            tuple(both[value] for value in sorted(both)),
             met,
             (*stage.ends, len(box.branches)) if last else stage.ends,
             stage.given,
@@ -334,7 +336,7 @@ class _Survey:
     def _share_done(self) -> float:
         """Share of the work that the steps done make; a second round may be the last."""
         rounds = min(self.effort.rounds, LIKELY_ROUNDS)
-        lengths = [2 * len(self.question.frequencies(turn)) for turn in range(rounds)]
+        lengths = [2 * len(self.question.values(turn)) for turn in range(rounds)]
         return min(self.stage.steps / sum(lengths), 1.0)
 
     def _met(self, rounds: int) -> NDArray[np.bool_]:
@@ -346,7 +348,7 @@ class _Survey:
     def _search(
         self, starts: Real, known: _Known, *, also_unstable: bool
     ) -> tuple[Coverage, list[Real]]:
-        """Follow what motions come to; the states from which the next frequency starts."""
+        """Follow what motions come to; the states from which the next value starts."""
         attractors: list[Orbit] = []
         runs, wandering = [], []
         for start in starts:
@@ -354,7 +356,7 @@ class _Survey:
             if run is None:
                 continue
             runs.append(run)
-            orbit = orbit or self._settled_on(run, known.omega, attractors)
+            orbit = orbit or self._settled_on(run, known.here, attractors)
             if orbit is None:
                 wandering.append(run)
             elif not any(same_orbit(orbit, other) for other in attractors):
@@ -366,7 +368,7 @@ class _Survey:
             self._beside(runs, known)
             self._deflate(adrift + settled, known)
         coverage = Coverage(
-            known.frequency_hz,
+            known.here.value,
             tuple(sorted({orbit.period for orbit in attractors})),
             len(runs) - len(wandering),
             len(wandering),
@@ -379,15 +381,15 @@ class _Survey:
 
         It ends as soon as it comes near to one; no states if it cannot be computed.
         """
-        flow = self.box.flow
-        settling = settling_periods(flow.system, known.frequency_hz)
+        here = known.here
+        settling = settling_periods(here.flow.system, here.frequency_hz)
         settling = min(settling, self.effort.settling)
         left = settling + math.ceil(RETURNS * self.max_period) + 1
         states = np.array([start])
         while left > 0:
-            self.box.tell("search", known.frequency_hz)
+            self.box.tell("search", here.value)
             count = min(left, max(PIECE, len(states) // 4))
-            found = flow.strobe(states[-1], known.omega, count)
+            found = here.flow.strobe(states[-1], here.omega, count)
             if found.failure:
                 return None, None
             states = np.vstack([states, found.ends])
@@ -397,7 +399,7 @@ class _Survey:
             left -= count
         return states, None
 
-    def _settled_on(self, run: Real, omega: float, known: Sequence[Orbit]) -> Orbit | None:
+    def _settled_on(self, run: Real, here: Section, known: Sequence[Orbit]) -> Orbit | None:
         """Stable orbit to which a run comes near at its end, one of the known ones if it can be."""
         scale = float(np.linalg.norm(run, axis=1).max()) or 1.0
         for orbit in known:
@@ -408,22 +410,19 @@ class _Survey:
             off = np.linalg.norm(tail[period:] - tail[:-period], axis=1)
             if float(np.median(off)) > NEAR * scale:
                 continue
-            found = self._orbit_near(run[-1 - period], period, omega)
+            found = orbit_near(here.flow, run[-1 - period], period, here.omega, self.box.observe)
             if found is None or not found.stable:
                 continue
             if _nearest(stroboscopic(found), run[-1]) < NEAR * scale:
                 return next((other for other in known if same_orbit(found, other)), found)
         return None
 
-    def _orbit_near(self, start: Real, period: int, omega: float) -> Orbit | None:
-        return orbit_near(self.box.flow, start, period, omega, self.box.observe)
-
-    def _follow_guesses(self, frequency_hz: float, seed: Sequence[int]) -> None:
+    def _follow_guesses(self, here: Section, seed: Sequence[int]) -> None:
         """Follow the orbits to which the strategies lead, each with random numbers of its own."""
         spacing, periods = self.effort.spacing, self._unstable_periods()
         for number, strategy in strategies_of(self.effort):
             rng = np.random.default_rng((*seed, AGAIN + number))
-            place = Place(frequency_hz, spacing, periods, rng)
+            place = Place(here, spacing, periods, rng)
             for _, orbits in strategy.guesses(self.box, self.box.branches, place):
                 for orbit in orbits:
                     self._follow(orbit)
@@ -433,7 +432,7 @@ class _Survey:
 
     def _beside(self, runs: Sequence[Real], known: _Known) -> None:
         """Look for unstable orbits of short periods beside motions."""
-        box, omega = self.box, known.omega
+        box = self.box
         for period, run in product(self._unstable_periods(), runs):
             for start in near_returns(run[TRANSIENT:], period, CANDIDATES):
                 state = run[TRANSIENT + start]
@@ -441,16 +440,16 @@ class _Survey:
                 if number is not None:
                     known.met.append(number)
                     continue
-                found = orbit_beside(box.flow, state, period, omega, box.observe)
+                found = orbit_beside(known.here, state, period, box.observe)
                 for orbit in box.within([found]):
                     self._meet(orbit, known)
 
     def _deflate(self, starts: Sequence[Real], known: _Known) -> None:
         """Look for unstable orbits of short periods with the known ones divided out."""
-        box = self.box
+        flow, omega, observe = known.here.flow, known.here.omega, self.box.observe
         for period, start in product(self._unstable_periods(), starts):
             others = known.of_period(period)
-            other = deflated_orbit(box.flow, start, period, known.omega, others, box.observe)
+            other = deflated_orbit(flow, start, period, omega, others, observe)
             if other is not None:
                 self._follow(other)
                 known.take()
@@ -476,11 +475,10 @@ class _Survey:
 
 
 class _Known:
-    """Orbits of all branches at one frequency, and which of the branches motions came to."""
+    """Orbits of all branches at one value, and which of the branches motions came to."""
 
-    def __init__(self, box: Collector, frequency_hz: float) -> None:
-        self.box, self.frequency_hz = box, frequency_hz
-        self.omega = 2.0 * math.pi * frequency_hz
+    def __init__(self, box: Collector, here: Section) -> None:
+        self.box, self.here = box, here
         self.met: list[int] = []
         self._orbits: list[tuple[int, Orbit, Real]] = []  # with their stroboscopic states
         self._seen = 0
@@ -489,7 +487,7 @@ class _Known:
     def take(self) -> None:
         """Take the orbits of branches that were found since."""
         for number in range(self._seen, len(self.box.branches)):
-            orbits = self.box.branches[number].at(self.frequency_hz)
+            orbits = self.box.branches[number].at(self.here.value)
             self._orbits += [(number, orbit, stroboscopic(orbit)) for orbit in orbits]
         self._seen = len(self.box.branches)
 
@@ -502,14 +500,14 @@ class _Known:
 
         They need not where a mode is not damped.
         """
-        if not is_damped(self.box.flow.system):
+        if not is_damped(self.here.flow.system):
             return False
         orbits = [orbit for _, orbit, _ in self._orbits]
         return any(sum_of_indices(orbits, n) != 1 for n in range(1, longest + 1))
 
     def number(self, orbit: Orbit) -> int | None:
-        """Number of the branch that an orbit, perhaps of another frequency, lies on."""
-        if orbit.omega == self.omega:
+        """Number of the branch that an orbit, perhaps of another value, lies on."""
+        if orbit.problem.flow is self.here.flow and orbit.omega == self.here.omega:
             return next((i for i, other, _ in self._orbits if same_orbit(orbit, other)), None)
         return self.box.branch_of(orbit)
 

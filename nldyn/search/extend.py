@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -12,11 +11,12 @@ from typing import Protocol
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import SystemModelError, check_range, check_types, check_whole, shown
+from nldyn.base.errors import SystemModelError, check_types, check_whole, shown
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.branches.checkpoint import BranchFile, Tally, checkpoint_of_several
 from nldyn.branches.continuation import extended
 from nldyn.branches.step_control import ContinuationOptions
+from nldyn.orbits.axis import Axis, Section
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import MOST_COUNT
@@ -24,13 +24,11 @@ from nldyn.runtime.progress import Progress, shows_progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.collector import Collector, counted, middle_orbit
 from nldyn.search.diagram import Diagram, check_known
-from nldyn.search.exploration import check_spacing, steps_between
-from nldyn.search.fixed_point_index import index_note, is_damped, without_index_note
-from nldyn.system.chart import FREQUENCY
-from nldyn.system.parameters import Parameter
+from nldyn.search.exploration import check_spacing
+from nldyn.search.fixed_point_index import index_note, is_damped_along, without_index_note
 
-PLACES = 6  # orbits of a branch near a frequency
-WINDOW = 0.03  # relative distance within which frequencies are near
+PLACES = 6  # orbits of a branch near a value
+WINDOW = 0.03  # distance on its scale within which values are near
 
 Guesses = Iterator[tuple[set[int], Sequence[Orbit]]]  # branches each was made of, its orbits
 
@@ -41,25 +39,20 @@ class Place:
 
     Parameters
     ----------
-    frequency_hz : float
-        In Hz.
+    here : Section
+        The motions at the frequency, or the value of another parameter.
     spacing : float
-        Relative distance to the next such frequency.
+        Relative distance to the next such value, see `ExploreOptions`.
     periods : range
         Of the orbits wanted, one after the other.
     rng : Generator
         Of what is random.
     """
 
-    frequency_hz: float
+    here: Section
     spacing: float
     periods: range
     rng: np.random.Generator
-
-    @property
-    def omega(self) -> float:
-        """Frequency in rad/s."""
-        return 2.0 * math.pi * self.frequency_hz
 
 
 class Strategy(Protocol):
@@ -106,7 +99,7 @@ def extend_diagram(
     *,
     min_period: int = 1,
     max_period: int = 3,
-    range_hz: tuple[float, float] | None = None,
+    limits: tuple[float, float] | None = None,
     spacing: float = 0.01,
     options: ContinuationOptions | None = None,
     progress: Progress | None = None,
@@ -114,26 +107,26 @@ def extend_diagram(
 ) -> Diagram:
     """Find further branches beside those known.
 
-    At one frequency after the other a strategy guesses where orbits lie, and the Gauss-Newton
-    method [Allgower and Georg 1990, chapter 3] goes to the nearest orbit, at a frequency that it
-    finds. If that lies on no known branch, its branch is followed, with what it leads to. Flips of
-    the branches given are not followed: begin with what `explore` or `diagram` has found. Call it
-    again with what it has found, and with another seed, until it finds no more.
+    At one frequency, or value of the parameter, after the other a strategy guesses where orbits
+    lie, and the Gauss-Newton method [Allgower and Georg 1990, chapter 3] goes to the nearest orbit,
+    at a value that it finds. If that lies on no known branch, its branch is followed, with what it
+    leads to. Flips of the branches given are not followed: begin with what `explore` or `diagram`
+    has found. Call it again with what it has found, and with another seed, until it finds no more.
 
     Parameters
     ----------
     known : Diagram
-        Branches of a system, from `diagram` or `explore`, with their orbits.
+        Branches of a system, from `diagram` or `explore`, with their orbits; in any parameter.
     strategy : Strategy
         How guesses are made: `PseudoOrbits`, `Mixtures`, `ClosedWalks`, or another one with the
         methods of `Strategy`.
     min_period, max_period : int
         Shortest and longest orbits guessed, in excitation periods.
-    range_hz : (float, float), optional
-        Frequencies at which guesses are made, within those of `known`; all of these if not given.
+    limits : (float, float), optional
+        Values between which guesses are made, within those of `known`; all of these if not given.
         Branches found are followed through all.
     spacing : float
-        Relative distance of these frequencies.
+        Relative distance of these values, see `ExploreOptions`.
     options : ContinuationOptions, optional
         Step control.
     progress : callable, optional
@@ -186,21 +179,18 @@ def extend_diagram(
     check_branches("known: branches", known.branches)
     if not known.branches:
         raise SystemModelError("known: has no branches to begin with")
-    check_known(known, known.branches[0].points[0].problem.flow)
+    axis = check_known(known, known.branches[0].nodes[0].family.problem.flow)
     strategy.check(max_period)
-    within = _range_within(known.range_hz, range_hz)
-    search = _Search(
-        known, strategy, range(min_period, max_period + 1), inner_frequencies(within, spacing),
-        spacing,
-    )  # fmt: skip
-    box = collector_beside(known, options, progress, checkpoint)
+    values = inner_values(_axis_within(axis, limits), spacing)
+    search = _Search(known, strategy, range(min_period, max_period + 1), values, spacing)
+    box = collector_beside(known, axis, options, progress, checkpoint)
     with box.checkpoint:
         _take_kept(box, max_period)
         tally = search.follow_new(box)
-    if is_damped(box.flow.system):
-        box.notes.append(index_note(box.branches, box.range_hz, max_period))
+    if is_damped_along(axis, box.flow):
+        box.notes.append(index_note(box.branches, axis, max_period))
     box.notes.append(search.note(tally, box.branches))
-    return Diagram(tuple(box.branches), box.range_hz, box.observe, tuple(box.notes))
+    return Diagram.of(box)
 
 
 def check_strategy(strategy: object) -> None:
@@ -230,8 +220,8 @@ class _Search:
         That guesses.
     periods : range
         Of the orbits wanted, one after the other.
-    frequencies : sequence of float
-        Where guesses are made, in Hz.
+    values : sequence of float
+        Where guesses are made.
     spacing : float
         Relative distance of these.
     """
@@ -239,38 +229,38 @@ class _Search:
     known: Diagram
     strategy: Strategy
     periods: range
-    frequencies: Sequence[float]
+    values: Sequence[float]
     spacing: float
 
     def given(self) -> set[int]:
-        """Indices of the branches known of these periods that reach one of the frequencies."""
-        low, high = self.frequencies[0], self.frequencies[-1]
+        """Indices of the branches known of these periods that reach one of the values."""
+        low, high = self.values[0], self.values[-1]
         return {
             index
             for index, branch in enumerate(self.known.branches)
             if branch.period in self.periods
-            and branch.frequency_hz.max() >= low
-            and branch.frequency_hz.min() <= high
+            and branch.values.max() >= low
+            and branch.values.min() <= high
         }
 
     def follow_new(self, box: Collector) -> Tally:
         """Follow the orbits that lie on no branch; what was tried.
 
-        How many frequencies are done is kept in the file of the box; a search with the same
-        strategy, known branches, periods, frequencies and options goes on after them. At each
-        frequency guesses are made from the branches that were known when it was begun.
+        How many values are done is kept in the file of the box; a search with the same
+        strategy, known branches, periods, values and options goes on after them. At each
+        value guesses are made from the branches that were known when it was begun.
         """
         given, to_meet = set(range(len(self.known.branches))), self.given()
         longest, question = self.periods[-1], self._digest(box.options)
         tally = box.checkpoint.tally
         if tally is None or tally.question != question:
             tally = Tally(question, len(to_meet), len(box.branches))
-        for number in range(tally.done, len(self.frequencies)):
-            box.done = number / len(self.frequencies)
+        for number in range(tally.done, len(self.values)):
+            box.done = number / len(self.values)
             box.checkpoint.tally = tally
             box.checkpoint.offer()
             tried, came, met = 0, 0, set[int]()
-            known, place = box.branches[: tally.known], self._place(number)
+            known, place = box.branches[: tally.known], self._place(box, number)
             for used, orbits in self.strategy.guesses(box, known, place):
                 tried += 1
                 came += bool(orbits)
@@ -291,16 +281,16 @@ class _Search:
         box.checkpoint.tally = tally
         return tally
 
-    def _place(self, number: int) -> Place:
+    def _place(self, box: Collector, number: int) -> Place:
         rng = np.random.default_rng([self.strategy.seed, number])
-        return Place(self.frequencies[number], self.spacing, self.periods, rng)
+        return Place(box.at(self.values[number]), self.spacing, self.periods, rng)
 
     def _digest(self, options: ContinuationOptions) -> str:
         """A name that tells this search from others."""
-        digest = hashlib.sha256(np.array(self.frequencies).tobytes())
+        digest = hashlib.sha256(np.array(self.values).tobytes())
         digest.update(f"{self.strategy!r} {self.periods} {options}".encode())
         for branch in self.known.branches:
-            digest.update(branch.frequency_hz.tobytes())
+            digest.update(branch.values.tobytes())
         return digest.hexdigest()[:16]
 
     def note(self, tally: Tally, branches: Sequence[Branch]) -> str:
@@ -313,36 +303,32 @@ class _Search:
         )
 
 
-def _range_within(
-    known: tuple[float, float], range_hz: tuple[float, float] | None
-) -> tuple[float, float]:
-    """A range in Hz within that of the branches known, which is meant if there is none."""
-    if range_hz is None:
+def _axis_within(known: Axis, limits: tuple[float, float] | None) -> Axis:
+    """The axis over a range within that of the branches known, which is meant if there is none."""
+    if limits is None:
         return known
-    low, high = check_range(range_hz)
-    if not known[0] <= low < high <= known[1]:
+    chart = known.chart.over(limits)
+    (first, last), low, high = known.limits, chart.low, chart.high
+    if not first <= low < high <= last:
         raise SystemModelError(
-            f"range_hz = ({low:g}, {high:g}) must lie within that of the branches known, "
-            f"({known[0]:g}, {known[1]:g})"
+            f"limits = ({low:g}, {high:g}) must lie within those of the branches known, "
+            f"({first:g}, {last:g})"
         )
-    return low, high
+    return replace(known, chart=chart)
 
 
 def collector_beside(
     known: Diagram,
+    axis: Axis,
     options: ContinuationOptions | None,
     progress: Progress | None,
     checkpoint: BranchFile | None,
 ) -> Collector:
     """A collector that has the known branches, and a file for what is found beside them."""
-    own, progress = known.branches[0].points[0].problem.flow, progress or silent
-    options = options or ContinuationOptions()
-    low, high = known.range_hz
-    box = Collector(own, (low, high), known.observe, options, progress)
+    own, progress = known.branches[0].nodes[0].family.problem.flow, progress or silent
+    box = Collector(own, axis, known.observe, options or ContinuationOptions(), progress)
     box.take(known.branches, without_index_note(known.notes))
-    box.checkpoint = checkpoint_of_several(
-        checkpoint, box.branches, own, box.range_hz, Parameter(FREQUENCY)
-    )
+    box.checkpoint = checkpoint_of_several(checkpoint, box.branches, own, axis)
     return box
 
 
@@ -355,23 +341,26 @@ def _take_kept(box: Collector, max_period: int) -> None:
     box.follow_up(count, max_period, max_period, None)
 
 
-def relative_distance(reached: Real, frequency_hz: float) -> float:
-    """How far, relatively, a branch ends from a frequency; zero if it does not."""
-    low, high = math.log(reached.min() / frequency_hz), math.log(reached.max() / frequency_hz)
-    return max(0.0, low, -high)
+def distance_from(branch: Branch, here: Section) -> float:
+    """How far a branch ends from a value, on its scale; zero if it does not."""
+    reached = coordinates(branch)
+    return max(0.0, float(reached.min()) - here.coordinate, here.coordinate - float(reached.max()))
 
 
-def orbits_near(branch: Branch, frequency_hz: float) -> list[Orbit]:
-    """A few orbits of a branch of about a frequency, or the nearest one."""
-    away = np.abs(np.log(branch.frequency_hz / frequency_hz))
+def coordinates(branch: Branch) -> Real:
+    """Values of the parameter at the points of a branch, on its scale."""
+    return np.array([node.point[-1] for node in branch.nodes])
+
+
+def orbits_near(branch: Branch, here: Section) -> list[Orbit]:
+    """A few orbits of a branch of about a value, or the nearest one."""
+    away = np.abs(coordinates(branch) - here.coordinate)
     near = np.flatnonzero(away <= max(WINDOW, float(away.min())))
     places = np.linspace(0.0, near.size - 1.0, min(PLACES, near.size))
     return [branch.points[near[round(place)]] for place in places.tolist()]
 
 
-def inner_frequencies(range_hz: tuple[float, float], spacing: float) -> list[float]:
-    """Frequencies in Hz within a range, at least one, in equal ratios of at most 1 + spacing."""
-    low, high = range_hz
-    count = steps_between(low, high, spacing)
-    found: list[float] = np.geomspace(low, high, count + 2)[1:-1].tolist()
+def inner_values(axis: Axis, spacing: float) -> list[float]:
+    """Values within a range, at least one, in equal steps of at most a share."""
+    found: list[float] = axis.spread(axis.steps(spacing) + 2)[1:-1].tolist()
     return found

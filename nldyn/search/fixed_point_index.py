@@ -1,4 +1,4 @@
-"""Indices of fixed points: they add up to one at a frequency, unless orbits are missing there."""
+"""Indices of fixed points: they add up to one at any value, unless orbits are missing there."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import SystemModelError, check_frequency, check_range, check_whole
+from nldyn.base.errors import SystemModelError, check_whole, is_finite, shown
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.branches.endings import Ending
-from nldyn.flow.flow_map import same_flow
+from nldyn.flow.flow_map import FlowMap
+from nldyn.orbits.axis import Axis
 from nldyn.orbits.orbit import Orbit
+from nldyn.system.chart import moves_frequency
 from nldyn.system.system import System
 
 RESOLVED = 1e-8  # relative width of a range of frequencies that counts
@@ -23,8 +25,8 @@ NOTE = "indices of the fixed points of "  # how the note on them begins
 SAME = 1e-12  # relative difference of frequencies that are one
 
 
-def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) -> int:
-    """Sum of the indices of all fixed points of Pⁿ on some branches, at one frequency.
+def index_sum(branches: Iterable[Branch], value: float, period: int = 1) -> int:
+    """Sum of the indices of all fixed points of Pⁿ on some branches, at one value.
 
     P takes the state over one period of the excitation. A fixed point has the index +1 or -1, the
     sign of det(I - DPⁿ), that is of ∏(1 - μᵢ). Motions of a structure with damping in all of its
@@ -39,8 +41,9 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
     ----------
     branches : iterable of Branch
         Of one system, each of them once; those of a `Diagram`, for example.
-    frequency_hz : float
-        Excitation frequency in Hz, within the range that the branches were followed in.
+    value : float
+        Excitation frequency in Hz, or value of the parameter, within the range that the branches
+        were followed in.
     period : int
         Number n of excitation periods.
 
@@ -52,7 +55,7 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
     Raises
     ------
     SystemModelError
-        If the frequency or the period is none, the frequency lies outside the range that a branch
+        If the value or the period is none, the value lies outside the range that a branch
         was followed in, there is no branch, they are of several systems, or a mode is not damped.
 
     References
@@ -72,14 +75,14 @@ def index_sum(branches: Iterable[Branch], frequency_hz: float, period: int = 1) 
     >>> [orbit.stable for orbit in branch.at(12.15)], index_sum([branch], 12.15)
     ([True, False, True], 1)
     """
-    given = _checked("index_sum", branches, period, frequency_hz, frequency_hz)
-    return sum_of_indices([o for branch in given for o in branch.at(frequency_hz)], period)
+    given = _checked("index_sum", branches, period, value, value)
+    return sum_of_indices([o for branch in given for o in branch.at(value)], period)
 
 
 def index_gaps(
-    branches: Iterable[Branch], range_hz: tuple[float, float], period: int = 1
+    branches: Iterable[Branch], limits: tuple[float, float], period: int = 1
 ) -> list[tuple[float, float]]:
-    """Ranges of frequency in which the indices of the fixed points of Pⁿ do not add up to one.
+    """Ranges in which the indices of the fixed points of Pⁿ do not add up to one.
 
     Along each branch the index is that of the computed orbits; it changes at folds, where branches
     cross and, for even multiples of the branch's period, at flips. So the sum is known all over the
@@ -92,15 +95,16 @@ def index_gaps(
     ----------
     branches : iterable of Branch
         Of one system, each of them once; those of a `Diagram`, for example.
-    range_hz : (float, float)
-        Frequencies in Hz, ascending, within the range that the branches were followed in.
+    limits : (float, float)
+        Frequencies in Hz, or values of the parameter, ascending, within the range that the branches
+        were followed in.
     period : int
         Number n of excitation periods.
 
     Returns
     -------
     list of (float, float)
-        In Hz, ascending; none if the sum is one everywhere.
+        Ascending; none if the sum is one everywhere.
 
     Raises
     ------
@@ -122,10 +126,11 @@ def index_gaps(
     >>> [(round(a, 2), round(b, 2)) for a, b in index_gaps([branch], (30.0, 60.0), 2)]
     [(33.65, 60.0)]
     """
-    low, high = check_range(range_hz)
+    low, high = limits
     given = _checked("index_gaps", branches, period, low, high)
+    chart = given[0].nodes[0].family.charts[0]
     ends, rise = _changes(given, period)
-    first, last = np.log(2.0 * math.pi * np.array([low, high]))
+    first, last = chart.coordinate(low), chart.coordinate(high)
     wrong: list[tuple[float, float]] = []
     order = np.argsort(ends, kind="stable")
     ends = np.concatenate([[first], np.clip(ends[order], first, last), [last]])
@@ -137,8 +142,8 @@ def index_gaps(
             wrong[-1] = (wrong[-1][0], b)
         else:
             wrong.append((a, b))
-    wide = [np.exp(gap) / (2.0 * math.pi) for gap in wrong if gap[1] - gap[0] > RESOLVED]
-    return [(float(a), float(b)) for a, b in wide]
+    wide = [gap for gap in wrong if gap[1] - gap[0] > RESOLVED]
+    return [(chart.value(a), chart.value(b)) for a, b in wide]
 
 
 def _checked(
@@ -153,23 +158,32 @@ def _checked(
     """
     branches = list(branches) if isinstance(branches, Iterable) else branches
     check_branches("branches", branches)
-    check_frequency("frequency_hz", low)
     check_whole("period", period, 1)
+    if not (is_finite(low) and is_finite(high) and low <= high):
+        asked = shown(low if low is high else (low, high))
+        raise SystemModelError(f"{caller}: needs finite values, ascending, got {asked}")
     if not branches:
         raise SystemModelError(f"{caller}: branches must not be empty")
+    first = branches[0].nodes[0].family
+    held = None if moves_frequency(first.charts[0].parameter) else first.frequency_hz
+    axis = Axis(first.charts[0], held)
     for branch in branches:
-        a, b = branch.course.limits if branch.course else (0.0, math.inf)
-        if not a * (1.0 - SAME) <= low <= high <= b * (1.0 + SAME):
-            asked = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+        a, b = branch.course.limits if branch.course else (-math.inf, math.inf)
+        if not a - SAME * abs(a) <= low <= high <= b + SAME * abs(b):
             raise SystemModelError(
-                f"{caller}: branch '{branch.name}' was followed from {a:g} to {b:g} Hz, "
-                f"which does not tell of {asked} Hz"
+                f"{caller}: branch '{branch.name}' was followed from {axis.told_span(a, b)}, "
+                f"which does not tell of {axis.told_span(low, high)}"
             )
-    flow = branches[0].nodes[0].orbit.problem.flow
-    if not all(same_flow(branch.nodes[0].orbit.problem.flow, flow) for branch in branches):
-        raise SystemModelError(f"{caller}: the branches must be of one system and accuracy")
+    flow = first.problem.flow
+    if not all(
+        axis.is_along(branch.nodes[0]) and axis.is_of(flow, branch.nodes[0].family.problem.flow)
+        for branch in branches
+    ):
+        raise SystemModelError(
+            f"{caller}: the branches must be of one system and accuracy, in one parameter"
+        )
     counted = [branch for branch in branches if period % branch.period == 0]
-    if not is_damped(flow.system):
+    if not all(is_damped(axis.at(flow, value).flow.system) for value in {low, high}):
         raise SystemModelError(
             f"{caller}: the indices add up to one only where every mode is damped, but one is not"
         )
@@ -177,7 +191,7 @@ def _checked(
 
 
 def _changes(branches: Sequence[Branch], period: int) -> tuple[Real, NDArray[np.int_]]:
-    """Values of ln ω at which the sum of the indices changes, and by how much."""
+    """Places on the parameter's scale at which the sum of the indices changes, and by how much."""
     ends, rises = [np.empty(0)], [np.empty(0, dtype=int)]
     for branch in branches:
         x, signs = _along(branch, period // branch.period)
@@ -188,9 +202,9 @@ def _changes(branches: Sequence[Branch], period: int) -> tuple[Real, NDArray[np.
 
 
 def _along(branch: Branch, times: int) -> tuple[Real, NDArray[np.int_]]:
-    """Values of ln ω at the places of a branch, and the index between each and the next one.
+    """Places of a branch on the parameter's scale, and the index between each and the next one.
 
-    It is that of the end whose multipliers are clear of where it changes, or follows from what is
+    That is that of the end whose multipliers are clear of where it changes, or follows from what is
     next to it along the branch. At a branch point it changes unless what is clear on both sides
     says that it does not: a branch that leaves there to one side only comes back with the same.
     """
@@ -235,16 +249,17 @@ def _distance(orbit: Orbit, times: int) -> float:
         return float(np.nanmin(np.abs(orbit.multipliers**times - 1.0), initial=math.inf))
 
 
-def index_note(branches: Sequence[Branch], range_hz: tuple[float, float], longest: int) -> str:
+def index_note(branches: Sequence[Branch], axis: Axis, longest: int) -> str:
     """Whether the indices of the fixed points of P to P^longest add up to one, in a sentence."""
     powers = "P" if longest == 1 else f"P to {_power(longest)}"
-    told = f"{NOTE}{powers} add up to one from {range_hz[0]:g} to {range_hz[1]:g} Hz"
+    told = f"{NOTE}{powers} add up to one from {axis.told_span(*axis.limits)}"
     wrong = []
     for n in range(1, longest + 1):
-        gaps = index_gaps(branches, range_hz, n) if branches else [range_hz]
+        gaps = index_gaps(branches, axis.limits, n) if branches else [axis.limits]
         if gaps:
             ranges = f"in {len(gaps)} ranges " if len(gaps) > 1 else ""
-            wrong.append(f"{_power(n)} {ranges}from {gaps[0][0]:.10g} to {gaps[-1][1]:.10g} Hz")
+            span = axis.told_span(gaps[0][0], gaps[-1][1], digits=10)
+            wrong.append(f"{_power(n)} {ranges}from {span}")
     if not wrong:
         return f"{told}; isolas that are missing as a whole would not change that"
     return f"{told} but for {', '.join(wrong)}: orbits are missing, or a branch was broken off"
@@ -278,3 +293,9 @@ def index(orbit: Orbit, times: int = 1) -> int:
 def is_damped(system: System) -> bool:
     """Whether every mode of the structure without its stops loses energy."""
     return system.linear.slowest_decay > 0.0
+
+
+def is_damped_along(axis: Axis, flow: FlowMap) -> bool:
+    """Whether every mode loses energy at both ends of a range and in its middle."""
+    places = (*axis.limits, axis.between(*axis.limits, 0.5))
+    return all(is_damped(axis.at(flow, value).flow.system) for value in places)

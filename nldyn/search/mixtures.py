@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.branches.branch import Branch
+from nldyn.orbits.axis import Section
 from nldyn.orbits.starts import SHORT_STEPS, nearest_orbit
 from nldyn.search.collector import Collector
-from nldyn.search.extend import Guesses, Place, check_numbers, orbits_near, relative_distance
+from nldyn.search.extend import Guesses, Place, check_numbers, distance_from, orbits_near
 from nldyn.search.pseudo_orbits import nodes_of
 
-NEIGHBOURS = 40  # branches whose orbits are mixed, the nearest in frequency
+NEIGHBOURS = 40  # branches whose orbits are mixed, the nearest in the parameter
 BEYOND = 0.8  # part of the way between two orbits by which a mixture may lie beyond either
 
 
@@ -66,12 +67,12 @@ class Mixtures:
         """The two branches of each mixture, and the orbit near it if that is in the range."""
         if not branches:
             return
-        loops = Loops.of(branches, place.frequency_hz, place.periods[-1], place.rng)
+        loops = Loops.of(branches, place.here, place.periods[-1], place.rng)
         for period in place.periods:
             for _ in range(self.tries):
-                box.tell(self.what, place.frequency_hz)
+                box.tell(self.what, place.here.value)
                 used, nodes = loops.mixture(period, place.rng)
-                orbit = nearest_orbit(box.flow, nodes, place.omega, box.observe, SHORT_STEPS)
+                orbit = nearest_orbit(place.here, nodes, box.observe, SHORT_STEPS)
                 yield used, box.within([orbit])
 
 
@@ -94,21 +95,21 @@ class Loops:
     def of(
         cls,
         branches: Sequence[Branch],
-        frequency_hz: float,
+        here: Section,
         longest: int,
         rng: np.random.Generator,
     ) -> Loops:
-        """Those of the branches nearest to a frequency, first those up to a period.
+        """Those of the branches nearest to a value, first those up to a period.
 
-        Of more that reach the frequency, some at random.
+        Of more that reach the value, some at random.
         """
-        away = [relative_distance(branch.frequency_hz, frequency_hz) for branch in branches]
+        away = [distance_from(branch, here) for branch in branches]
         longer = [branch.period > longest for branch in branches]
         order = np.lexsort((rng.permutation(len(branches)).tolist(), away, longer))
         rows = [
-            (index, nodes_of(orbit))
+            (index, nodes_of(orbit, here.base))
             for index in order[:NEIGHBOURS].tolist()
-            for orbit in orbits_near(branches[index], frequency_hz)
+            for orbit in orbits_near(branches[index], here)
         ]
         return cls(np.array([index for index, _ in rows]), [nodes for _, nodes in rows])
 

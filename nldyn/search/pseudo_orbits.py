@@ -15,6 +15,8 @@ from scipy.spatial.distance import cdist
 
 from nldyn.base.arrays import Real
 from nldyn.branches.branch import Branch
+from nldyn.flow.flow_map import FlowMap
+from nldyn.orbits.axis import Section
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import SEGMENTS_PER_PERIOD
 from nldyn.orbits.starts import LONG_STEPS, SHORT_STEPS, nearest_orbit
@@ -80,14 +82,14 @@ class PseudoOrbits:
         Those that long steps between few states lead to, and short steps between many: beside few
         orbits the first meet more others, beside many the second.
         """
-        pieces = Pieces.of(branches, place.frequency_hz, place.spacing)
+        pieces = Pieces.of(branches, place.here, place.spacing)
         for period in place.periods:
             for sequence in islice(pieces.pseudo_orbits(period, MOST_ALIKE, place.rng), self.tries):
-                box.tell(self.what, place.frequency_hz)
+                box.tell(self.what, place.here.value)
                 chosen = list(sequence)
                 nodes = pieces.nodes[chosen]
                 orbits = [
-                    nearest_orbit(box.flow, nodes[:, ::every], place.omega, box.observe, steps)
+                    nearest_orbit(place.here, nodes[:, ::every], box.observe, steps)
                     for every, steps in WAYS
                 ]
                 yield set(pieces.branch[chosen].tolist()), box.within(orbits)
@@ -121,13 +123,13 @@ class Pieces:
     ends: Real
 
     @classmethod
-    def of(cls, branches: Sequence[Branch], frequency_hz: float, spacing: float) -> Pieces:
-        """Pieces of the orbits of some branches within a relative distance of a frequency."""
-        window = frequency_hz / (1.0 + spacing), frequency_hz * (1.0 + spacing)
+    def of(cls, branches: Sequence[Branch], here: Section, spacing: float) -> Pieces:
+        """Pieces of the orbits of some branches within a distance of a value."""
+        window = here.axis.around(here.value, spacing)
         pieces: list[tuple[int, int, int, int, Real, Real]] = []
         passages = 0
         for index, branch in enumerate(branches):
-            orbits = list(_orbits_within(branch, window))
+            orbits = list(_orbits_within(branch, window, here.base))
             for number, nodes in zip(_passages(orbits), orbits, strict=True):
                 for place, after in enumerate(np.roll(nodes[:, 0], -1, axis=0)):
                     row = index, passages + number, place, len(nodes), nodes[place], after
@@ -194,22 +196,25 @@ class Pieces:
             yield from sequences
 
 
-def _orbits_within(branch: Branch, window: tuple[float, float]) -> Iterator[Real]:
-    """States (period, NODES, 2n) of orbits of a branch at a few frequencies within a window."""
-    reached = branch.frequency_hz
+def _orbits_within(branch: Branch, window: tuple[float, float], base: FlowMap) -> Iterator[Real]:
+    """States (period, NODES, 2n) of orbits of a branch at a few values within a window."""
+    reached = branch.values
     low, high = max(window[0], float(reached.min())), min(window[1], float(reached.max()))
     if low >= high:
         return
     count = 1 + round((PLACES - 1) * (high - low) / (window[1] - window[0]))
     for share in (np.arange(count) + 0.5) / count:
         for orbit in branch.at(low + share * (high - low)):
-            yield nodes_of(orbit)
+            yield nodes_of(orbit, base)
 
 
-def nodes_of(orbit: Orbit) -> Real:
-    """States z (period, NODES, 2n) of an orbit at equidistant phases of each of its periods."""
+def nodes_of(orbit: Orbit, base: FlowMap) -> Real:
+    """States z (period, NODES, 2n) of an orbit at equidistant phases of each of its periods.
+
+    They are in the coordinates of a base.
+    """
     phases = 2.0 * math.pi / NODES * np.arange(NODES * orbit.period, dtype=float)
-    return orbit.problem.flow.to_state(orbit.states(phases)).reshape(orbit.period, NODES, -1)
+    return base.to_state(orbit.states(phases)).reshape(orbit.period, NODES, -1)
 
 
 def _passages(orbits: Sequence[Real]) -> list[int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -16,8 +15,8 @@ from scipy.spatial import KDTree
 from nldyn.base.arrays import Real
 from nldyn.branches.branch import Branch
 from nldyn.flow.flow_map import FlowMap
+from nldyn.orbits.axis import Section
 from nldyn.orbits.newton import spread
-from nldyn.orbits.orbit import stroboscopic
 from nldyn.orbits.shooting import SEGMENTS_PER_PERIOD, shooting_problem
 from nldyn.orbits.starts import SHORT_STEPS, nearest_orbit, random_states, reach, simulate
 from nldyn.search.collector import Collector
@@ -27,8 +26,8 @@ from nldyn.search.extend import (
     Guesses,
     Place,
     check_numbers,
+    distance_from,
     orbits_near,
-    relative_distance,
 )
 
 NEIGHBOURS = 20  # states near an image to which a walk may go on
@@ -93,10 +92,11 @@ class ClosedWalks:
 
     def guesses(self, box: Collector, branches: Sequence[Branch], place: Place) -> Guesses:
         """No branch, and the orbit near each walk if that is in the range."""
-        flow, omega, rng = box.flow, place.omega, place.rng
-        asked = partial(box.tell, self.what, place.frequency_hz)
+        here, rng = place.here, place.rng
+        flow, omega = here.flow, here.omega
+        asked = partial(box.tell, self.what, here.value)
         asked()
-        known = _known_states(flow, branches, place.frequency_hz, rng)
+        known = _known_states(here, branches, rng)
         if not len(known):  # every motion failed, and no orbit is known
             return
         graph = StateGraph.of(flow, omega, Cloud.of(flow, known), self.states, rng, asked)
@@ -105,21 +105,22 @@ class ClosedWalks:
             for walk in islice(graph.closed_walks(period, rng), self.tries):
                 asked()
                 nodes = np.array([spread(one_period, graph.states[at], omega) for at in walk])
-                nodes = nodes.reshape(period, SEGMENTS_PER_PERIOD, -1)
-                orbit = nearest_orbit(flow, nodes, omega, box.observe, SHORT_STEPS)
+                nodes = here.to_base(nodes.reshape(period, SEGMENTS_PER_PERIOD, -1))
+                orbit = nearest_orbit(here, nodes, box.observe, SHORT_STEPS)
                 yield set(), box.within([orbit])
 
 
 def _known_states(
-    flow: FlowMap, branches: Sequence[Branch], frequency_hz: float, rng: np.random.Generator
+    here: Section, branches: Sequence[Branch], rng: np.random.Generator
 ) -> Real:
-    """States (k, 2n) at phase zero of some motions at a frequency, and of known orbits near it."""
-    omega = 2.0 * math.pi * frequency_hz
+    """States (k, 2n) at phase zero of some motions at a value, and of known orbits near it."""
+    flow, omega = here.flow, here.omega
     starts = random_states(flow, omega, MOTIONS, int(rng.integers(2**31)))
     runs = simulate(flow, omega, starts, *MOTION_PERIODS).runs
-    reaching = [b for b in branches if relative_distance(b.frequency_hz, frequency_hz) <= WINDOW]
-    orbits = [orbit for branch in reaching for orbit in orbits_near(branch, frequency_hz)]
-    return np.vstack([np.empty((0, 2 * flow.system.size)), *runs, *map(stroboscopic, orbits)])
+    reaching = [branch for branch in branches if distance_from(branch, here) <= WINDOW]
+    orbits = [orbit for branch in reaching for orbit in orbits_near(branch, here)]
+    known = [here.states_of(orbit) for orbit in orbits]
+    return np.vstack([np.empty((0, 2 * flow.system.size)), *runs, *known])
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,6 +68,7 @@ NAMES = (
     *(FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_SPRINGS),
     *(*OF_SPRINGS, *_OF_MODES, SPIN, SPEED),
 )
+THE_FREQUENCY = Parameter(FREQUENCY)
 LAST_DIGIT = 1e-14  # relative: a value so near to the end of its range is that
 
 
@@ -128,12 +129,15 @@ def told_value(parameter: Parameter, *values: float, digits: int = 6) -> str:
     >>> told_value(Parameter(FREQUENCY), 23.5), told_value(Parameter("gap", 1), 2e-5)
     ('23.5 Hz', 'gap_1 = 2e-05 m')
     """
-    unit = UNITS[parameter.name]
     numbers = " and ".join(dict.fromkeys(f"{value:.{digits}g}" for value in values))
+    return with_unit(parameter, numbers)
+
+
+def with_unit(parameter: Parameter, numbers: str) -> str:
+    """Numbers that are values of a parameter, with its unit and its name; Hz without a name."""
+    unit = unit_of(parameter)
     number = numbers if unit == "1" else f"{numbers} {unit}"
-    if parameter.name == FREQUENCY:
-        return number
-    return f"{parameter_name(parameter)} = {number}"
+    return number if parameter.name == FREQUENCY else f"{parameter_name(parameter)} = {number}"
 
 
 def parameter_name(parameter: Parameter) -> str:
@@ -149,9 +153,18 @@ def label_of(parameter: Parameter) -> str:
     >>> label_of(Parameter(FREQUENCY)), label_of(Parameter("gap"))
     ('frequency (Hz)', 'gap (m)')
     """
-    unit = UNITS[parameter.name]
-    words = parameter_name(parameter).removesuffix("_hz").replace("_", " ")
+    words, unit = words_of(parameter), unit_of(parameter)
     return words if unit == "1" else f"{words} ({unit})"
+
+
+def unit_of(parameter: Parameter) -> str:
+    """Unit of a parameter, 1 if it has none."""
+    return UNITS[parameter.name]
+
+
+def words_of(parameter: Parameter) -> str:
+    """Name of a parameter in words."""
+    return parameter_name(parameter).removesuffix("_hz").replace("_", " ")
 
 
 def moves_frequency(parameter: Parameter) -> bool:

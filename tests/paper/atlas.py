@@ -17,6 +17,7 @@ from pathlib import Path
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import broken_off
 from nldyn.branches.step_control import ContinuationOptions
+from nldyn.orbits.axis import Axis
 from nldyn.plot.diagram import MARKERS, plot_diagram, save_figure
 from nldyn.report.results import write_table
 from nldyn.runtime.files import write_whole
@@ -176,7 +177,7 @@ def joined(parts: Sequence[Diagram], chart: Chart) -> Diagram:
     """The diagrams of the families of a chart as one, with what all of them together tell."""
     branches = tuple(branch for part in parts for branch in part.branches)
     notes = tuple(note for part in parts for note in part.notes)
-    told = index_note(branches, chart.range_hz, longest_whole(chart.doubled[0]))
+    told = index_note(branches, Axis.in_frequency(chart.range_hz), longest_whole(chart.doubled[0]))
     notes = (*summed_up(branches, notes), told)
     return Diagram(branches, chart.range_hz, parts[0].observe, notes)
 

@@ -13,6 +13,7 @@ from nldyn.base.resources import example
 from nldyn.branches.branch import Branch
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import flow_of
+from nldyn.orbits.axis import Axis
 from nldyn.orbits.orbit import check_observe
 from nldyn.orbits.starts import orbit_near
 from nldyn.runtime.progress import Progress, silent
@@ -145,8 +146,8 @@ def _scene(name: str) -> Callable[[], System]:
 
 # The subharmonics of the 1-DOF model that section 3 lists, beside the main 1/2 and 1/3.
 LISTED = tuple(
-    SubharmonicSeed(period, near_hz)
-    for period, near_hz in (
+    SubharmonicSeed(period, hz)
+    for period, hz in (
         (3, 37.1), (5, 62.2), (2, 16.1), (4, 33.0), (7, 58.0),
         (10, 83.0), (3, 18.4), (5, 31.0), (9, 56.0), (13, 81.0),
     )
@@ -288,7 +289,8 @@ def computed(job: Job, period: int, progress: Progress = silent) -> Diagram:
 
 def with_quarters(found: Diagram, job: Job, system: System, progress: Progress) -> Diagram:
     """A diagram with the 1/4 branches that are born at flips of its wide 1/2 branches."""
-    box = Collector(flow_of(system), job.range_hz, found.observe, job.options, progress, done=0.9)
+    axis = Axis.in_frequency(job.range_hz)
+    box = Collector(flow_of(system), axis, found.observe, job.options, progress, done=0.9)
     box.take(found.branches, found.notes)
     for branch in box.of_period(2):
         for special in branch.special_points if is_wide(branch) else ():
@@ -301,7 +303,8 @@ def follow_kept(job: Job, period: int, system: System, progress: Progress) -> Di
     """Follow the branches through the kept starts of a job of one period."""
     low, high = LOWEST_HZ if period == 1 else job.range_hz[0], job.range_hz[1]
     flow, observe = flow_of(system), check_observe(system, None)
-    box = Collector(flow, (low, high), observe, job.options, progress)
+    axis = Axis.in_frequency((low, high))
+    box = Collector(flow, axis, observe, job.options, progress)
     (starts,) = (follow.starts(job.name) for follow in job.starts if follow.period == period)
     for number, start in enumerate(starts):
         box.done = number / len(starts)
@@ -310,7 +313,7 @@ def follow_kept(job: Job, period: int, system: System, progress: Progress) -> Di
             box.from_orbits([orbit])
         else:
             box.notes.append(f"{LOST} {start.period} at {start.frequency_hz:.6g} Hz")
-    return Diagram(tuple(box.branches), (low, high), observe, tuple(box.notes))
+    return Diagram.of(box)
 
 
 def is_wide(branch: Branch) -> bool:

@@ -78,7 +78,7 @@ def _diagrams_table(results: Mapping[str, Diagram]) -> str:
         error = max((o.error for o in orbits), default=0.0)
         judged = [o.liouville_error for o in orbits if not math.isnan(o.liouville_error)]
         liouville = max(judged, default=0.0)
-        low, high = diagram.range_hz
+        low, high = diagram.limits
         body.append(
             f"<tr><td>{escape(name)}</td><td>{low:g} to {high:g} Hz</td>"
             f"<td>{len(diagram.branches)}</td><td>{len(orbits)}</td><td>{error:.1e}</td>"

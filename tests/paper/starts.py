@@ -22,6 +22,7 @@ from nldyn.branches.branch import Branch
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import flow_of
 from nldyn.io.store import save
+from nldyn.orbits.axis import Axis
 from nldyn.orbits.orbit import Orbit, check_observe, stroboscopic
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import orbit_near
@@ -162,7 +163,8 @@ def follow_starts(
                 f"{2 * system.size}"
             )
     observe = check_observe(system, None)
-    box = Collector(flow, range_hz, observe, options, progress or silent)
+    axis = Axis.in_frequency(range_hz)
+    box = Collector(flow, axis, observe, options, progress or silent)
     lost = 0
     for number, start in enumerate(starts):
         box.done = number / len(starts)
@@ -193,7 +195,7 @@ def _follow(box: Collector, start: Start, doubled: tuple[int, int]) -> Diagram:
     else:
         box.notes.append(f"{LOST} {start.period} at {start.frequency_hz:.6g} Hz")
     branches, notes = tuple(box.branches[count:]), tuple(box.notes[told:])
-    return Diagram(branches, box.range_hz, box.observe, notes)
+    return Diagram(branches, box.axis.limits, box.observe, notes)
 
 
 def is_at(orbit: Orbit, state: Real) -> bool:

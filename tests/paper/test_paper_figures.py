@@ -12,7 +12,7 @@ from paper.page import write_page
 @pytest.fixture
 def results():
     found = {job: FakeDiagram([resonance()]) for jobs in SHOWN.values() for job in jobs}
-    found["two_dof_xi_0.001"] = FakeDiagram([resonance()], range_hz=(18.0, 90.0))
+    found["two_dof_xi_0.001"] = FakeDiagram([resonance()], limits=(18.0, 90.0))
     found["two_dof.sub14"] = FakeDiagram([resonance(14, 55.0, 58.0, 20)])
     return found
 

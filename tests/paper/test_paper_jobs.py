@@ -65,7 +65,7 @@ def test_a_job_is_followed_from_its_starts_once(short_job, tmp_path, monkeypatch
     found = diagrams_of(values)[NAME]
     harmonic = found.of_period(1)
     assert len(harmonic) == 1
-    assert found.range_hz == (LOWEST_HZ, 44.0)
+    assert found.limits == (LOWEST_HZ, 44.0)
     kinds = [special.kind for special in harmonic[0].special_points]
     assert (kinds.count("LP"), kinds.count("PD")) == (2, 2)
     assert not is_wide(harmonic[0])

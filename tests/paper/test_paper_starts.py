@@ -60,7 +60,7 @@ def test_what_is_followed_from_starts_is_what_the_search_found(found, tmp_path):
     assert len(starts) == len(found.branches)
     options = ContinuationOptions()
     system = scene_system("two_dof_xi_0.01")
-    again = follow_starts(system, starts, found.range_hz, options, WITHOUT_DOUBLED)
+    again = follow_starts(system, starts, found.limits, options, WITHOUT_DOUBLED)
     assert all(orbit.motion is None for branch in again.branches for orbit in branch.points)
     assert len(again.branches) == len(found.branches) > 5
     for branch in found.branches:
@@ -73,7 +73,7 @@ def test_what_is_followed_from_starts_is_what_the_search_found(found, tmp_path):
 def test_a_missing_branch_is_told_by_its_indices(found):
     through = next(b for b in found.branches if index_sum([b], 36.0, b.period) not in (0, 1))
     others = [branch for branch in found.branches if branch is not through]
-    assert f"but for P^{through.period} from " in index_note(others, found.range_hz, 3)
+    assert f"but for P^{through.period} from " in index_note(others, found.limits, 3)
 
 
 def test_what_is_no_orbit_among_the_starts_is_counted(found):
@@ -83,7 +83,7 @@ def test_what_is_no_orbit_among_the_starts_is_counted(found):
     states = state, np.array([1.0, -1.0, 1.0, -1.0]), 1.0001 * state
     starts = [Start(orbit.period, orbit.frequency_hz, state) for state in states]
     again = follow_starts(
-        scene_system("two_dof_xi_0.01"), starts, found.range_hz, ContinuationOptions(),
+        scene_system("two_dof_xi_0.01"), starts, found.limits, ContinuationOptions(),
         WITHOUT_DOUBLED,
     )  # fmt: skip
     assert again.notes[0].startswith("from 3 starts of period ")
@@ -112,7 +112,7 @@ def test_a_damaged_file_of_starts_is_told_by_its_line(lines, message, tmp_path):
 def test_starts_of_another_model_are_refused(found):
     with pytest.raises(SystemModelError, match="start 1: has a state of 2 numbers, the system one"):
         follow_starts(
-            scene_system("two_dof_xi_0.01"), [Start(1, 36.0, np.zeros(2))], found.range_hz,
+            scene_system("two_dof_xi_0.01"), [Start(1, 36.0, np.zeros(2))], found.limits,
             ContinuationOptions(), WITHOUT_DOUBLED,
         )  # fmt: skip
 
@@ -121,7 +121,7 @@ def test_starts_of_another_model_are_refused(found):
 def short_chart(found, monkeypatch, tmp_path):
     """A chart of a short range, with the starts that the search gave."""
     name = "two_dof_xi_0.01"
-    chart = replace(chart_named(name), range_hz=found.range_hz, doubled=(4, 10))
+    chart = replace(chart_named(name), range_hz=found.limits, doubled=(4, 10))
     write_starts(starts_path(name, tmp_path), found.branches)
     starts = read_starts(name, tmp_path)
     monkeypatch.setattr("paper.atlas.CHARTS", (chart,))

@@ -148,7 +148,7 @@ def test_several_branches_in_one_file(one_dof, tmp_path):
     path = tmp_path / "diagram.h5"
     save(whole, path)
     loaded = load_diagram(path)
-    assert (loaded.range_hz, loaded.observe, loaded.notes) == ((30.0, 40.0), "middle", whole.notes)
+    assert (loaded.limits, loaded.observe, loaded.notes) == ((30.0, 40.0), "middle", whole.notes)
     for mine, other in zip(loaded.branches, whole.branches, strict=True):
         assert_same_branches(mine, other)
         assert mine.points[0].problem.flow is loaded.branches[0].points[0].problem.flow

@@ -63,7 +63,7 @@ def stopper(count, error=RuntimeError):
     return report
 
 
-WANTED = {"range_hz": (20.0, 60.0), "periods": [1, 2], "search_points": 4}
+WANTED = {"limits": (20.0, 60.0), "periods": [1, 2], "search_points": 4}
 
 
 @pytest.fixture(scope="module")
@@ -364,7 +364,7 @@ def test_a_file_of_another_diagram_is_refused_and_kept(one_dof, tmp_path):
     stop = dataclasses.replace(one_dof.stops[0], gap=1e-5)
     for system, wanted in (
         (dataclasses.replace(one_dof, stops=(stop,)), WANTED),
-        (one_dof, {**WANTED, "range_hz": (20.0, 21.0)}),
+        (one_dof, {**WANTED, "limits": (20.0, 21.0)}),
     ):
         with pytest.raises(SystemModelError, match="another system, accuracy or range"):
             diagram(system, **wanted, checkpoint=CheckpointFile(path))

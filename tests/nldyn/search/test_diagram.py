@@ -30,6 +30,7 @@ from nldyn import (
 )
 from nldyn.branches.continuation import open_ends
 from nldyn.orbits import OrbitSearchOptions
+from nldyn.orbits.axis import Axis
 from nldyn.orbits.orbit import minimal_period, same_orbit, stroboscopic
 from nldyn.orbits.starts import orbit_beside, orbit_near
 from nldyn.search import SubharmonicSeed
@@ -68,6 +69,7 @@ def test_steps_of_least_length_find_the_branch_that_a_frequency_just_misses(
 ):
     folds = [s for s in harmonic_branch.special_points if s.kind == "LP"]
     assert len(folds) >= 2
+    axis = Axis.in_frequency((5.7, 90.0))
     for fold in folds:
         state, flow = stroboscopic(fold.orbit)[0], fold.orbit.problem.flow
         before, after = (
@@ -77,7 +79,7 @@ def test_steps_of_least_length_find_the_branch_that_a_frequency_just_misses(
         held = orbit_near(flow, state, 1, omega, "middle")
         if held is not None:  # another part of the branch
             assert np.linalg.norm(stroboscopic(held)[0] - state) > 0.1 * np.linalg.norm(state)
-        found = orbit_beside(flow, state, 1, omega, "middle")
+        found = orbit_beside(axis.at(flow, omega / (2.0 * np.pi)), state, 1, "middle")
         assert found is not None
         assert harmonic_branch.contains(found)
         assert np.linalg.norm(stroboscopic(found)[0] - state) < 0.1 * np.linalg.norm(state)
@@ -110,7 +112,7 @@ def test_diagram_finds_the_doubled_branch_between_two_flips(one_dof):
     assert [b.period for b in found.branches].count(1) == 1
     doubled = [b for b in found.of_period(2) if "8.7" in b.stop_reason and "10.4" in b.stop_reason]
     assert len(doubled) == 1
-    assert found.range_hz == (8.0, 12.0)
+    assert found.limits == (8.0, 12.0)
     assert found.observe == "middle"
     names = [b.name for b in found.branches]
     assert len(set(names)) == len(names)
@@ -175,7 +177,7 @@ def test_diagram_says_what_it_did_not_find(one_dof):
     )  # fmt: skip
     assert [b.period for b in found.branches] == [1]
     assert found.notes == ("no 1/2 orbit found near 26 Hz",)
-    with pytest.raises(SystemModelError, match="near_hz = 95 lies outside"):
+    with pytest.raises(SystemModelError, match="near = 95 lies outside"):
         diagram(one_dof, (84.0, 88.0), seeds=[SubharmonicSeed(2, 95.0)])
 
 
@@ -277,7 +279,7 @@ def test_a_search_that_would_take_hours_is_shortened():
             )
         )
 
-    whole = OrbitSearchOptions()
-    large = shortened(held(25), whole, 25.0, 12, (1, 2, 3))
+    whole, axis = OrbitSearchOptions(), Axis.in_frequency((20.0, 30.0))
+    large = shortened(axis.at(held(25), 25.0), whole, 12, (1, 2, 3))
     assert (large.starts, large.candidates, large.recorded) == (2, 1, 43)
-    assert shortened(held(1), whole, 25.0, 12, (1, 2, 3)) == whole
+    assert shortened(axis.at(held(1), 25.0), whole, 12, (1, 2, 3)) == whole

@@ -38,6 +38,7 @@ from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.branches import at_frequency as crossings
 from nldyn.io import CheckpointFile
 from nldyn.io.branches import load_branches, load_diagram, load_exploration
+from nldyn.orbits.axis import Axis
 from nldyn.orbits.deflation import deflated_orbit
 from nldyn.orbits.orbit import stroboscopic
 from nldyn.orbits.starts import random_states, settling_periods
@@ -103,7 +104,7 @@ def test_no_branch_is_found_twice(around_37):
 
 def test_every_simulation_is_accounted_for(around_37):
     """Twelve random starts at each frequency, and those carried over from the one before."""
-    frequencies = np.array([c.frequency_hz for c in around_37.coverage])
+    frequencies = np.array([c.value for c in around_37.coverage])
     assert (frequencies[1:] / frequencies[:-1]).max() <= 1.01 * (1 + 1e-12)
     for c in around_37.coverage:
         assert c.settled + c.unsettled + c.failed >= 12
@@ -119,7 +120,7 @@ def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(
     searched, search = [], survey._Survey._search
 
     def given_in_the_end(self, starts, known, **others):
-        searched.append(known.frequency_hz)
+        searched.append(known.here.value)
         if len(searched) == found_by:
             self.box.from_orbits(map(middle_orbit, three.branches))
             known.take()
@@ -130,7 +131,7 @@ def test_a_frequency_is_searched_until_the_indices_of_its_orbits_add_up(
     effort = ExploreOptions(spacing=0.02, starts=1, **NOTHING_MORE)
     flow = three.branches[0].points[0].problem.flow
     found = explore(flow, THREE_HZ, 3, effort=effort, known=known)
-    counts = [searched.count(c.frequency_hz) for c in found.coverage]
+    counts = [searched.count(c.value) for c in found.coverage]
     branches, report = found.diagram.branches, found.report()
     sums = {index_sum(branches, hz, n) for hz in (36.2, 36.8) for n in (1, 2, 3)}
     if found_by is None:
@@ -342,7 +343,7 @@ def test_chao_bound_is_low_where_some_are_met_rarely():
 
 # --- the way up and down, interruption and files -------------------------------------------------
 
-QUESTION = {"range_hz": (36.0, 38.0), "max_period": 3}
+QUESTION = {"limits": (36.0, 38.0), "max_period": 3}
 EFFORT = ExploreOptions(
     spacing=0.02, starts=4, rounds=2, doubled_period=4,
     pseudo_orbits=2, mixtures=3, walks=3, walk_states=100,
@@ -397,8 +398,8 @@ def test_motions_are_carried_up_and_down(whole):
 
 def test_each_round_lies_between_those_before(whole):
     """Halves, then quarters of the first round's steps, on a logarithmic axis."""
-    steps = np.log([whole.question.frequencies(turn) for turn in range(1, 4)])
-    first = np.log(whole.question.frequencies(0))
+    steps = np.log([whole.question.values(turn) for turn in range(1, 4)])
+    first = np.log(whole.question.values(0))
     shares = (steps - first[:-1]) / np.diff(first)
     np.testing.assert_allclose(shares, np.repeat([[0.5], [0.25], [0.75]], 3, axis=1), rtol=1e-9)
 
@@ -562,7 +563,7 @@ def test_another_exploration_in_the_file_is_refused_and_kept(whole, tmp_path):
     other = replace(EFFORT, seed=21)
     asked = [
         {**QUESTION, "effort": other},
-        {**QUESTION, "effort": EFFORT, "range_hz": (36.0, 39.0)},
+        {**QUESTION, "effort": EFFORT, "limits": (36.0, 39.0)},
         {**QUESTION, "effort": EFFORT, "max_period": 4},
         {**QUESTION, "effort": EFFORT, "options": ContinuationOptions(max_step=0.04)},
     ]
@@ -584,7 +585,7 @@ def test_a_file_without_exploration_or_with_a_damaged_one_is_refused(whole, tmp_
     save(whole, path)
     with h5py.File(path, "r+") as file:
         file["exploration"].attrs["steps"] = 3
-    with pytest.raises(SystemModelError, match="'/exploration/steps' is 3 with 7 frequencies"):
+    with pytest.raises(SystemModelError, match="'/exploration/steps' is 3 with 7 values"):
         load_exploration(path)
 
 
@@ -627,7 +628,7 @@ def test_bad_efforts_are_refused_by_name(given, says):
 @pytest.mark.parametrize(
     ("range_hz", "period", "says"),
     [
-        ((10.0, 5.0), 2, "range_hz"),
+        ((10.0, 5.0), 2, "limits"),
         ((5.0, 10.0), 0, "max_period"),
         ((5.0, 10.0), 1.5, "max_period"),
     ],
@@ -640,7 +641,7 @@ def test_bad_questions_are_refused_before_any_simulation(range_hz, period, says)
 def test_a_doubled_branch_begins_at_its_flip():
     """What lies between the flip and the orbit from which the branch is followed belongs to it."""
     flow = FlowMap(system_of("one_dof"))
-    box = Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), silent)
+    box = Collector(flow, Axis.in_frequency((28.0, 60.0)), "middle", ContinuationOptions(), silent)
     box.from_orbits([solve_orbit(flow, 50.0)])
     flip = next(s for s in box.branches[0].special_points if s.kind == "PD")
     box.from_flip(flip)
@@ -654,9 +655,9 @@ def test_a_doubled_branch_begins_at_its_flip():
 
 def test_where_a_doubled_branch_comes_to_its_flip_the_other_one_has_half_the_period():
     """Followed on as a branch of the doubled period it would be the same orbits twice."""
-    flow = FlowMap(system_of("one_dof"))
+    flow, axis = FlowMap(system_of("one_dof")), Axis.in_frequency((28.0, 60.0))
     box, other = (
-        Collector(flow, (28.0, 60.0), "middle", ContinuationOptions(), silent) for _ in range(2)
+        Collector(flow, axis, "middle", ContinuationOptions(), silent) for _ in range(2)
     )
     box.from_orbits([solve_orbit(flow, 50.0)])
     harmonic = box.branches[0]
@@ -693,7 +694,7 @@ def test_orbits_of_a_branch_are_known_where_newtons_method_at_their_frequency_fa
 def test_orbits_beside_the_ends_of_a_doubled_branch_are_known():
     """At the frequency of one beside a flip, Newton's method may come to the single period."""
     flow = FlowMap(system_of("two_dof_xi_0.01"))
-    box = Collector(flow, (17.9, 18.9), "middle", ContinuationOptions(), silent)
+    box = Collector(flow, Axis.in_frequency((17.9, 18.9)), "middle", ContinuationOptions(), silent)
     box.from_orbits([solve_orbit(flow, 18.4), *find_orbits(flow, 18.6, 2)])
     harmonic = box.branches[0]
     flips = [s for s in harmonic.special_points if s.kind == "PD"]
@@ -707,8 +708,9 @@ def test_branches_taken_back_leave_a_search_as_it_was():
     """Where they were broken off, meet flips and cross is known as in the run that found them."""
     orbit = solve_orbit(between_stops(), 11.0)
     options = ContinuationOptions(max_points=32)
+    axis = Axis.in_frequency((11.0, 11.8))
     first, again = (
-        Collector(orbit.problem.flow, (11.0, 11.8), "m", options, lambda *at: None)
+        Collector(orbit.problem.flow, axis, "m", options, lambda *at: None)
         for _ in range(2)
     )
     first.follow(orbit, 2, 2, None)
@@ -724,7 +726,8 @@ def test_branches_taken_back_leave_a_search_as_it_was():
 def test_mirror_image_of_a_branch_of_a_symmetric_system_is_followed_too():
     """A closed 1/3 branch between two equal stops, which is not symmetric itself."""
     orbit = solve_orbit(between_stops(), 11.26, 3, guess=[7.9058e-06, 9.9213e-05])
-    box = Collector(orbit.problem.flow, (11.0, 12.0), "m", ContinuationOptions(), lambda *at: None)
+    axis = Axis.in_frequency((11.0, 12.0))
+    box = Collector(orbit.problem.flow, axis, "m", ContinuationOptions(), lambda *at: None)
     box.follow(orbit, 3, 3, None)
     one, image = box.branches
     assert one.closed and image.closed and not one.contains(middle_orbit(image))

@@ -22,8 +22,8 @@ from nldyn import (
 from nldyn.branches.endings import Ending
 from nldyn.io import CheckpointFile
 from nldyn.io.branches import load_branches, load_diagram
+from nldyn.orbits.axis import Axis
 from nldyn.search import ClosedWalks, Mixtures, PseudoOrbits
-from nldyn.search.exploration import steps_between
 from nldyn.search.fixed_point_index import index_gaps
 
 FEW = {
@@ -78,11 +78,11 @@ def test_only_the_periods_and_frequencies_wanted_are_tried(three, what):
     """And as many of each length as wanted, of pseudo-orbits as many as there are at most."""
     tried = set()
     done = extend_diagram(
-        three, FEW[what], min_period=2, max_period=2, range_hz=(37.2, 38.0), spacing=0.005,
+        three, FEW[what], min_period=2, max_period=2, limits=(37.2, 38.0), spacing=0.005,
         progress=lambda what, hz, done: tried.add(hz),
     )  # fmt: skip
     assert 37.2 < min(tried) < max(tried) < 38.0
-    assert len(tried) == steps_between(37.2, 38.0, 0.005)
+    assert len(tried) == Axis.in_frequency((37.2, 38.0)).steps(0.005)
     count = int(re.search(rf"of (\d+) {what} led to", done.notes[-1])[1])
     assert count == 3 * len(tried) or (what == "pseudo-orbits" and 0 < count < 3 * len(tried))
     assert " of the 1 given there, " in done.notes[-1]  # period 3 ends below
@@ -163,8 +163,8 @@ def test_a_branch_that_was_begun_is_finished(three, tmp_path):
         ({"max_period": 0}, "max_period must be"),
         ({"min_period": 0}, "min_period must be"),
         ({"min_period": 3, "max_period": 2}, "min_period must be"),
-        ({"range_hz": (30.0, 37.0)}, r"\(30, 37\) must lie within that of .*, \(36, 38.5\)"),
-        ({"range_hz": (37.0, 37.0)}, "range_hz must be two positive frequencies"),
+        ({"limits": (30.0, 37.0)}, r"\(30, 37\) must lie within those of .*, \(36, 38.5\)"),
+        ({"limits": (37.0, 37.0)}, "two finite numbers, ascending"),
         ({"spacing": 0.0}, "spacing must be at least 1e-06 and less than 1, got 0"),
         ({"spacing": float("nan")}, "spacing must be at least"),
         ({"known": None}, "known must be a Diagram"),
@@ -201,8 +201,8 @@ def test_strategies_refuse_numbers_that_make_no_sense(kind, numbers, message):
         ({"branches": (1,)}, "known: branches must be a list of branches"),
         ({"observe": "nose"}, "nose"),
         ({"notes": None}, "notes must be"),
-        ({"range_hz": (37.0, 36.5)}, "range_hz must be two positive frequencies"),
-        ({"range_hz": (35.0, 37.0)}, "was followed from 36 to 38.5 Hz, not over the range"),
+        ({"limits": (37.0, 36.5)}, "limits must be two positive frequencies"),
+        ({"limits": (35.0, 37.0)}, "was followed from 36 to 38.5 Hz, not over the range"),
     ],
 )
 def test_a_diagram_that_makes_no_sense_is_refused(three, change, message):

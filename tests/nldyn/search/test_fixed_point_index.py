@@ -67,7 +67,7 @@ def test_there_is_no_gap_beside_the_pitchforks_of_a_broken_symmetry(first_step):
     options = ContinuationOptions(first_step=first_step)
     found = diagram(system, (6.0, 10.0), (1,), search_points=3, options=options)
     assert [s.kind for b in found.branches for s in b.special_points].count("BP") == 4
-    assert index_gaps(found.branches, found.range_hz) == []
+    assert index_gaps(found.branches, found.limits) == []
 
 
 @pytest.mark.slow
@@ -78,7 +78,7 @@ def test_a_crossing_found_from_the_other_branch_has_its_place_on_this_one():
         [12.0], {"y": [0.7]}, modal_damping=0.02, stops=stops, excitation=[Unbalance("y", 6e-6)]
     )
     found = diagram(system, (20.0, 70.0), (1, 3), search_points=6)
-    assert index_gaps(found.branches, found.range_hz, 3) == []
+    assert index_gaps(found.branches, found.limits, 3) == []
     passed = 0
     for branch in found.branches:
         crossings = [id(s.point) for s in branch.special_points if s.kind == "BP"]
@@ -118,7 +118,7 @@ def test_a_missing_doubled_branch_shows_between_its_flips(doubled):
 
 def test_the_note_tells_for_each_power_where_orbits_are_missing(doubled):
     """Above the flip of the harmonic branch, without the doubled orbits."""
-    low, high = doubled.range_hz
+    low, high = doubled.limits
     harmonic = [branch for branch in doubled.branches if branch.period == 1]
     (flip,) = [s.frequency_hz for s in harmonic[0].special_points if s.kind == "PD"]
     assert index_gaps(harmonic, (low, high), 2) == [pytest.approx((flip, high), rel=1e-12)]
@@ -134,10 +134,10 @@ def test_the_note_tells_for_each_power_where_orbits_are_missing(doubled):
 
 @given(share=st.floats(0.001, 0.999), period=st.integers(1, 4), left=st.booleans())
 def test_the_gaps_are_where_the_sum_is_not_one(doubled, share, period, left):
-    low, high = doubled.range_hz
+    low, high = doubled.limits
     frequency = low * (high / low) ** share
     branches = [branch for branch in doubled.branches if left or branch.period == 1]
-    inside = any(a < frequency < b for a, b in index_gaps(branches, doubled.range_hz, period))
+    inside = any(a < frequency < b for a, b in index_gaps(branches, doubled.limits, period))
     assert (index_sum(branches, frequency, period) != 1) == inside
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nldyn.orbits.axis import Axis
 from nldyn.search import Mixtures
 from nldyn.search import mixtures as crossover
 from nldyn.search.extend import PLACES, WINDOW, Place, collector_beside, orbits_near
@@ -17,12 +18,12 @@ from nldyn.search.pseudo_orbits import NODES
 def test_orbits_beyond_the_range_are_not_met(three):
     """Mixed just below its upper end, half of them lie above it."""
     (harmonic,) = three.of_period(1)
-    _, high = three.range_hz
-    box = collector_beside(replace(three, branches=(harmonic,)), None, None, None)
+    _, high = three.limits
+    box = collector_beside(replace(three, branches=(harmonic,)), three.axis, None, None, None)
     inside, outside = [], []
     for top, found in ((high, inside), (2.0 * high, outside)):
-        place = Place(high, 0.01, range(1, 2), np.random.default_rng(1))
-        box.range_hz = three.range_hz[0], top
+        place = Place(box.at(high), 0.01, range(1, 2), np.random.default_rng(1))
+        box.axis = Axis.in_frequency((three.limits[0], top))
         for _, orbits in Mixtures(tries=50).guesses(box, box.branches, place):
             found += [orbit.frequency_hz for orbit in orbits]
     assert inside == [hz for hz in outside if hz <= high]
