@@ -265,6 +265,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
             remarks,
         )
         from nldyn.scene.faults import told_as
+        from nldyn.scene.followed import axis_of
         from nldyn.scene.read import load_scene
 
         loaded = load_scene(scene, mesh_folders)
@@ -287,6 +288,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
             if not only_simulated(loaded):
                 check_computable(loaded, scene)
                 check_held_to_follow(loaded, system)
+                axis_of(loaded, system)
 
         if as_json:
             from nldyn.report.modes import mode_table

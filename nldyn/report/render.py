@@ -170,13 +170,14 @@ def orbit_to_draw(
     from nldyn.orbits.solve import solve_orbit
     from nldyn.search.diagram import diagram
 
+    assert scene.continuation is not None
+    frequency_hz = frequency_hz or scene.continuation.frequency_hz
     if frequency_hz is not None:
         try:
             return solve_orbit(system, frequency_hz=frequency_hz, period=period)
         except ConvergenceError as error:
             raise SceneError(f"{scene.file}: {error}") from error
-    assert scene.continuation is not None
-    low, high = scene.continuation.range_hz
+    low, high = scene.continuation.limits
     found = diagram(system, (low, high), [1], search_points=4, progress=progress, jobs=jobs)
     orbits = [orbit for branch in found.branches for orbit in branch.points]
     if not orbits:

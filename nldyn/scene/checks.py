@@ -180,10 +180,11 @@ def _slow_remarks(scene: Scene, system: System) -> Iterator[str]:
             "nothing takes energy out, for there is neither [damping] nor a damper: motions do not "
             "settle, and 'nldyn run' takes many times as long as with damping"
         )
-    lowest, highest = min(scene.continuation.range_hz), float(system.frequencies_hz.max())
+    lowest, highest = scene.continuation.frequencies_hz[0], float(system.frequencies_hz.max())
+    where = ", where range_hz begins," if scene.continuation.range_hz else ""
     if highest > MANY_OSCILLATIONS * lowest:
         yield (
-            f"one period at {lowest:g} Hz, where range_hz begins, holds {highest / lowest:.0f} "
+            f"one period at {lowest:g} Hz{where} holds {highest / lowest:.0f} "
             f"oscillations of the mode at {highest:.4g} Hz, and the time that a branch takes grows "
             "with their number: keep fewer modes, or begin higher"
         )
@@ -204,11 +205,12 @@ def _range_remark(scene: Scene, highest_hz: float) -> str:
     """Say that the range goes beyond the modes that are kept; empty if it does not."""
     if scene.reduction is None or scene.continuation is None:
         return ""
-    top = max(scene.continuation.range_hz)
+    top = scene.continuation.frequencies_hz[1]
     if top <= highest_hz:
         return ""
+    named = "range_hz goes up to" if scene.continuation.range_hz else "frequency_hz is"
     return (
-        f"range_hz goes up to {top:g} Hz, but the model of the structure to {highest_hz:.4g} Hz "
+        f"{named} {top:g} Hz, but the model of the structure to {highest_hz:.4g} Hz "
         "only: keep more modes, or check the units"
     )
 
@@ -514,11 +516,17 @@ def _check_absolute(scene: Scene, report: Report) -> None:
 def _check_seeds(scene: Scene, report: Report) -> None:
     if scene.continuation is None:
         return
-    low, high = scene.continuation.range_hz
+    low, high = scene.continuation.limits
+    own, other, key = ("near_hz", "near", "range_hz")
+    if scene.continuation.range_hz is None:
+        own, other, key = ("near", "near_hz", "range")
     for number, seed in enumerate(scene.subharmonics):
-        if not low <= seed.near_hz <= high:
-            fault = f"must lie within continuation.range_hz, not at {seed.near_hz:g}"
-            raise report(("subharmonics", number, "near_hz"), fault)
+        near = getattr(seed, own)
+        if near is None or getattr(seed, other) is not None:
+            raise report(("subharmonics", number), f"needs '{own}', and no '{other}'")
+        if not low <= near <= high:
+            fault = f"must lie within continuation.{key}, not at {near:g}"
+            raise report(("subharmonics", number, own), fault)
 
 
 def _check_explore(scene: Scene, report: Report) -> None:

@@ -33,11 +33,14 @@ def load_case_of(scene: Scene) -> LoadCase:
     if isinstance(scene.damping.modal_ratio, list):
         fault = "must be one number where the number of modes is open"
         raise scene_error(scene.file, ("damping", "modal_ratio"), fault)
-    assert scene.continuation is not None
-    low, high = scene.continuation.range_hz
+    table = scene.continuation
+    assert table is not None
+    if table.range_hz is None:
+        fault = "is followed at one frequency: modes are chosen and compared over a range_hz"
+        raise scene_error(scene.file, ("continuation", "parameter"), fault)
     acting: dict[str, Any] = {**acting_elements(scene)}
     return LoadCase(
-        (low, high),
+        table.limits,
         **acting,
         modal_damping=scene.damping.modal_ratio,
         observe=scene.observed,

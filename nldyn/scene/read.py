@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from nldyn.base.errors import SceneError
 from nldyn.scene.checks import check_scene
 from nldyn.scene.faults import check_regular, lower_first, unreadable
+from nldyn.scene.followed import followed_parameter
 from nldyn.scene.messages import from_validation, scene_error
 from nldyn.scene.schema import Scene
 from nldyn.scene.toml_faults import likely_missing
@@ -131,6 +132,7 @@ def scene_from_tables(
         fault = lower_first(str(error))
         raise SceneError(f"a folder for meshes cannot be used: {fault}") from None
     check_scene(scene, file)
+    followed_parameter(scene)
     return scene
 
 

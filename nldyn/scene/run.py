@@ -9,10 +9,12 @@ from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.io.checkpoint import CheckpointFile
+from nldyn.orbits.axis import Axis
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.scene.build import Structure, build_structure, build_system
 from nldyn.scene.checks import check_computable, check_held_to_follow, remarks
 from nldyn.scene.faults import told_as
+from nldyn.scene.followed import axis_of
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import ContinuationTable, Scene
 from nldyn.search.diagram import Diagram, SubharmonicSeed, diagram
@@ -82,14 +84,16 @@ def compute(
     shares = parts_of_work(scene, progress, built=structure is not None)
     structure = structure or structure_of(scene, shares.part("model"))
     shares.end("model")
-    flow, table = _to_follow(scene, structure)
+    flow, table, axis = _to_follow(scene, structure)
 
     with told_as(scene, ("continuation",), SystemModelError):
         found = diagram(
             flow,
-            (table.range_hz[0], table.range_hz[1]),
+            axis.limits,
             table.periods,
-            seeds=[SubharmonicSeed(seed.period, seed.near_hz) for seed in scene.subharmonics],
+            parameter=axis.parameter,
+            frequency_hz=axis.frequency_hz,
+            seeds=[SubharmonicSeed(seed.period, seed.place) for seed in scene.subharmonics],
             search_points=table.search_points,
             doublings=table.follow_doublings,
             options=ContinuationOptions(max_step=table.max_step),
@@ -150,7 +154,7 @@ def explore_scene(
     shares = parts_of_work(scene, progress, built=structure is not None)
     structure = structure or structure_of(scene, shares.part("model"))
     shares.end("model")
-    flow, table = _to_follow(scene, structure)
+    flow, table, axis = _to_follow(scene, structure)
 
     if scene.explore is None:
         raise scene_error(scene.file, ("explore",), "is missing")
@@ -158,8 +162,10 @@ def explore_scene(
     with told_as(scene, ("explore",), SystemModelError):
         found = explore(
             flow,
-            (table.range_hz[0], table.range_hz[1]),
+            axis.limits,
             efforts.pop("max_period"),
+            parameter=axis.parameter,
+            frequency_hz=axis.frequency_hz,
             effort=ExploreOptions(**efforts),
             options=ContinuationOptions(max_step=table.max_step),
             progress=shares.part("branches"),
@@ -188,16 +194,17 @@ def parts_of_work(scene: Scene, progress: Progress | None, *, built: bool = Fals
     return Shares(progress or silent, {"model": weight, "branches": 1.0})
 
 
-def _to_follow(scene: Scene, structure: Structure) -> tuple[FlowMap, ContinuationTable]:
-    """Flow map of a scene that says what to compute."""
+def _to_follow(scene: Scene, structure: Structure) -> tuple[FlowMap, ContinuationTable, Axis]:
+    """Flow map of a scene that says what to compute, how, and over what."""
     system = build_system(scene, structure.reduced)
     table = scene.continuation
     assert table is not None
     check_held_to_follow(scene, system)
+    axis = axis_of(scene, system)
     with told_as(scene, ("continuation",), SystemModelError):
         if system.bonds:  # searches start where it rests
             rest_positions(system)
-        return FlowMap(system, FlowOptions(table.rtol)), table
+        return FlowMap(system, FlowOptions(table.rtol)), table, axis
 
 
 def _remarked(scene: Scene, flow: FlowMap, found: Diagram) -> Diagram:

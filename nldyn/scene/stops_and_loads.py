@@ -86,6 +86,12 @@ def _excitation(scene: Scene, number: int, table: ExcitationTable) -> tuple[Exci
     return tuple(one for at in loads for one in _excitation_at(scene, number, table, at))
 
 
+def sources_before(scene: Scene, number: int) -> int:
+    """How many of the loads of a system come of the tables before one."""
+    tables = enumerate(scene.excitation[:number])
+    return sum(len(_excitation(scene, each, table)) for each, table in tables)
+
+
 def _excitation_at(
     scene: Scene, number: int, table: ExcitationTable, at: str
 ) -> tuple[Excitation, ...]:
