@@ -10,6 +10,7 @@ from nldyn.bifurcations.normal_forms import NormalForm
 from nldyn.branches.endings import StopReason
 from nldyn.orbits.multipliers import Stability
 from nldyn.report import results
+from nldyn.system.chart import THE_FREQUENCY
 from nldyn.system.parameters import Parameter
 
 FREQUENCY = Parameter("frequency_hz")
@@ -111,6 +112,8 @@ class FakeDiagram:
     notes: tuple = ()
     limits: tuple = (5.0, 90.0)
     observe: str = "middle"
+    parameter: Parameter = THE_FREQUENCY
+    frequency_hz: None = None
 
     def of_period(self, period):
         return [branch for branch in self.branches if branch.period == period]

@@ -6,6 +6,7 @@ from scipy import sparse
 
 import cms
 from nldyn import Damper, HarmonicForce, LoadCase, Stop, System, Unbalance
+from nldyn.orbits.axis import Axis, Section
 from nldyn.orbits.bordered import OrbitFamily, Solved
 from nldyn.orbits.orbit import Orbit
 
@@ -95,3 +96,13 @@ def driven(power: float) -> System:
     stops = [Stop("x", 1.0, power), Stop("x", 1.0, power, direction=-1)]
     force = HarmonicForce("x", 1.0, phase_deg=-90.0)
     return System.from_matrices([[1.0]], [[0.0]], {"x": [1.0]}, stops=stops, excitation=[force])
+
+
+def section(flow, hz: float) -> Section:
+    """The motions of a flow map at a frequency."""
+    return Axis.in_frequency((0.5 * hz, 2.0 * hz)).at(flow, hz)
+
+
+def section_of(branch, hz: float) -> Section:
+    """The motions of a branch's system at a frequency."""
+    return section(branch.points[0].problem.flow, hz)

@@ -72,7 +72,8 @@ def save_exploration(path: str | Path, found: Exploration) -> None:
 
 def _of_diagram(diagram: Diagram) -> dict[str, Any]:
     """What a diagram has beside its branches; of an axis that is not the frequency, that too."""
-    about = {"limits": diagram.limits, "observe": diagram.observe, "notes": diagram.notes}
+    about: dict[str, Any] = {"limits": diagram.limits, "observe": diagram.observe}
+    about["notes"] = diagram.notes
     if diagram.frequency_hz is not None:
         about["frequency_hz"] = diagram.frequency_hz
     if diagram.parameter != THE_FREQUENCY:

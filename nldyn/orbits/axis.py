@@ -144,9 +144,10 @@ class Axis:
     def middles(self, count: int) -> list[float]:
         """Middles of so many equal parts of the range, on its scale."""
         edges = self.spread(count + 1)
+        middles = 0.5 * (edges[:-1] + edges[1:])
         if self.chart.logarithmic:
-            return np.sqrt(edges[:-1] * edges[1:]).tolist()
-        return (0.5 * (edges[:-1] + edges[1:])).tolist()
+            middles = np.sqrt(edges[:-1] * edges[1:])
+        return [float(value) for value in middles]
 
     def between(self, a: float, b: float, share: float) -> float:
         """Value a share of the way between two."""

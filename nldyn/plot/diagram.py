@@ -22,11 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 from nldyn.base.errors import SystemModelError, check_choice, check_types
 from nldyn.branches.branch import check_branches
 from nldyn.plot.hover import show_labels
-from nldyn.plot.words import ANGLES, LENGTHS, displacement_of, units_of
+from nldyn.plot.words import ANGLES, LENGTHS, Along, axis_unit, displacement_of, units_of
 from nldyn.runtime.progress import in_notebook
-from nldyn.system.chart import FREQUENCY, label_of, parameter_name, told_value
+from nldyn.system.chart import THE_FREQUENCY, parameter_name
 from nldyn.system.naming import stop_name
-from nldyn.system.parameters import Parameter
 from nldyn.system.rigid_stop import AnyStop
 
 if TYPE_CHECKING:
@@ -147,21 +146,6 @@ def length_unit(largest: float) -> tuple[float, str]:
     return axis_unit(largest, LENGTHS)
 
 
-def axis_unit(largest: float, units: Sequence[tuple[float, str]]) -> tuple[float, str]:
-    """Choose one of some units, the largest first, for an axis that reaches up to a value.
-
-    Examples
-    --------
-    >>> axis_unit(1.3e-3, ((1.0, "s"), (1e-3, "ms")))
-    (0.001, 'ms')
-    """
-    size = abs(largest)
-    for factor, name in units:
-        if size >= 0.5 * factor:
-            return factor, name
-    return units[-1] if 0.0 < size < math.inf else units[0]
-
-
 def mark_size(count: int) -> float:
     """Choose the size of special points in points: the more there are, the smaller.
 
@@ -211,7 +195,7 @@ def plot_diagram(
     legend: bool = True,
     hover: bool = True,
 ) -> Axes:
-    """Draw the largest displacement of each orbit against its excitation frequency.
+    """Draw the largest displacement of each orbit against the frequency, or another parameter.
 
     Parameters
     ----------
@@ -263,36 +247,35 @@ def plot_diagram(
     check_branches("diagram", branches)
     check_types(ax=(ax, Axes, None), special_points=(special_points, Sequence))
     check_choice("yscale", yscale, ("linear", "log"))
-    parameter = followed_parameter(branches)
+    along = followed(branches)
     for kind in special_points:
         check_choice("special_points", kind, MARKERS)
     ax = ax if ax is not None else new_axes()
     factor, unit = _unit_of(branches, unit, direction)
     colours = period_colours(branch.period for branch in branches)
     for branch in branches:
-        _draw_branch(ax, branch, colours[branch.period], factor)
+        _draw_branch(ax, branch, colours[branch.period], along, factor)
     marked = marked_points(branches, special_points)
     size = mark_size(sum(len(points) for points in marked.values()))
     for kind, points in marked.items():
-        _draw_marks(ax, points, kind, factor, size)
-    in_frequency = parameter.name == FREQUENCY
-    ax.set_xlabel("excitation frequency (Hz)" if in_frequency else label_of(parameter))
+        _draw_marks(ax, points, kind, along, factor, size)
+    ax.set_xlabel(along.label)
     observed = observed_interface(branches)
     ax.set_ylabel(f"largest {displacement_of(observed, direction)} ({unit})")
     ax.set_yscale(yscale)
     if yscale == "linear":
         ax.set_ylim(bottom=-0.02 * ax.get_ylim()[1])
-    references = references and in_frequency
-    lines = draw_references(ax, branches, factor, unit) if references and observed else []
+    references = references and observed != ""
+    lines = draw_references(ax, branches, along, factor, unit) if references else []
     if legend and branches:
         draw_legend(ax, colours, branches, marked, lines)
     if hover:
-        _label_orbits(ax, branches, marked, factor, unit)
+        _label_orbits(ax, branches, marked, along, factor, unit)
     return ax
 
 
-def followed_parameter(branches: Sequence[Branch]) -> Parameter:
-    """The parameter in which some branches were followed, the frequency if there are none.
+def followed(branches: Sequence[Branch]) -> Along:
+    """What some branches were followed along, the frequency if there are none.
 
     Raises
     ------
@@ -303,7 +286,9 @@ def followed_parameter(branches: Sequence[Branch]) -> Parameter:
     if len(parameters) > 1:
         names = ", ".join(map(parameter_name, parameters))
         raise SystemModelError(f"the branches were followed in different parameters: {names}")
-    return parameters[0] if parameters else Parameter(FREQUENCY)
+    if parameters in ([], [THE_FREQUENCY]):
+        return Along(THE_FREQUENCY)
+    return Along.of(parameters[0], max(float(np.abs(each.values).max()) for each in branches))
 
 
 def observed_interface(branches: Sequence[Branch]) -> str:
@@ -324,21 +309,26 @@ def marked_points(
     return {kind: points for kind, points in found.items() if points}
 
 
-def draw_references(ax: Axes, branches: Sequence[Branch], factor: float, unit: str) -> list[Line2D]:
+def draw_references(
+    ax: Axes, branches: Sequence[Branch], along: Along, factor: float, unit: str
+) -> list[Line2D]:
     """Draw stops of the observed interface and natural frequencies, as far as the axes reach.
 
-    They change no limit of the axes. Entries for a legend are given.
+    They change no limit of the axes. What changes along the branches is not drawn. Entries for a
+    legend are given.
     """
     system, name = branches[0].nodes[0].orbit.system, branches[0].nodes[0].orbit.observe
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
     gap: dict[str, Any] = {"color": REFERENCE, "linewidth": 0.9, "linestyle": "-."}
     linear: dict[str, Any] = {"color": "0.6", "linewidth": 0.9, "linestyle": (0, (5, 3))}
     entries = []
-    for place in sorted({abs(place) / factor for place in stop_places(system, name)}):
+    stays = along.parameter.name != "gap"
+    places = [place for place in stop_places(system, name) if stays]
+    for place in sorted({abs(place) / factor for place in places}):
         if max(low, 0.0) < place < high:
             ax.axhline(place, zorder=1, **gap)
             entries.append(Line2D([], [], label=f"gap of a stop, {place:.4g} {unit}", **gap))
-    natural = [hz for hz in system.frequencies_hz if left < hz < right]
+    natural = [hz for hz in system.frequencies_hz if along.in_frequency and left < hz < right]
     for hz in natural:
         ax.axvline(hz, zorder=1, **linear)
     if natural:
@@ -476,18 +466,19 @@ def period_colours(periods: Iterable[int]) -> dict[int, str]:
     return {p: PERIOD_COLOURS[i % len(PERIOD_COLOURS)] for i, p in enumerate(present)}
 
 
-def _draw_branch(ax: Axes, branch: Branch, colour: str, factor: float) -> None:
+def _draw_branch(ax: Axes, branch: Branch, colour: str, along: Along, factor: float) -> None:
     x, y, stable = branch_curve(branch)
     for run in stability_runs(stable):
         part = slice(run.start, run.stop)
         style = STABLE if run.stable else UNSTABLE
-        ax.plot(x[part], y[part] / factor, color=colour, linewidth=1.4, linestyle=style)
+        drawn = x[part] / along.factor, y[part] / factor
+        ax.plot(*drawn, color=colour, linewidth=1.4, linestyle=style)
 
 
 def _draw_marks(
-    ax: Axes, points: Sequence[SpecialPoint], kind: str, factor: float, size: float
+    ax: Axes, points: Sequence[SpecialPoint], kind: str, along: Along, factor: float, size: float
 ) -> None:
-    x = [float(point.value) for point in points]
+    x = [float(point.value) / along.factor for point in points]
     y = [float(point.orbit.max_abs_displacement) / factor for point in points]
     ax.plot(x, y, **mark_style(kind, size))
 
@@ -512,7 +503,12 @@ def mark_style(kind: str, size: float = 4.5) -> dict[str, Any]:
 
 
 def _label_orbits(
-    ax: Axes, branches: Sequence[Branch], marked: Iterable[str], factor: float, unit: str
+    ax: Axes,
+    branches: Sequence[Branch],
+    marked: Iterable[str],
+    along: Along,
+    factor: float,
+    unit: str,
 ) -> None:
     """Let special points, which come first, and points show what they are."""
     entries = [
@@ -527,25 +523,28 @@ def _label_orbits(
         for branch in branches
         for number, node in enumerate(branch.nodes)
     ]
-    places = [(node.value, node.orbit.max_abs_displacement / factor) for _, _, node in entries]
+    places = [
+        (node.value / along.factor, node.orbit.max_abs_displacement / factor)
+        for _, _, node in entries
+    ]
 
     def label(index: int) -> str:
         name, what, node = entries[index]
         orbit = node.orbit
-        title = f"{name or period_name(orbit.period)}, {what}"
-        if node.parameter.name != FREQUENCY:
-            title += f"\n{told_value(node.parameter, node.value, digits=7)}"
-        return f"{title}\n{orbit_text(orbit, factor, unit, stability=index >= count)}"
+        title, where = f"{name or period_name(orbit.period)}, {what}", along.told(node.value, 7)
+        return f"{title}\n{orbit_text(orbit, where, factor, unit, stability=index >= count)}"
 
     show_labels(ax, np.array(places, dtype=float).reshape(-1, 2), label)
 
 
-def orbit_text(orbit: Orbit, factor: float, unit: str, *, stability: bool = True) -> str:
+def orbit_text(
+    orbit: Orbit, where: str, factor: float, unit: str, *, stability: bool = True
+) -> str:
     """Say in two lines what an orbit is, with displacements in a unit of `factor` metres."""
     word = ("stable, " if orbit.stable else "unstable, ") if stability else ""
     impacts = f"{orbit.impacts} impact{'' if orbit.impacts == 1 else 's'}"
     return (
-        f"{orbit.frequency_hz:.7g} Hz, largest {orbit.max_abs_displacement / factor:.5g} {unit}\n"
+        f"{where}, largest {orbit.max_abs_displacement / factor:.5g} {unit}\n"
         f"{word}largest multiplier {abs(orbit.largest_multiplier):.4g}, {impacts}"
     )
 

@@ -26,7 +26,6 @@ from nldyn.plot.diagram import (
     PERIOD_COLOURS,
     STABLE,
     UNSTABLE,
-    axis_unit,
     draw_legend,
     length_unit,
     new_axes,
@@ -34,7 +33,7 @@ from nldyn.plot.diagram import (
     plot_diagram,
     stability_runs,
 )
-from nldyn.plot.words import LENGTHS, displacement_of, units_of
+from nldyn.plot.words import LENGTHS, axis_unit, displacement_of, units_of
 from nldyn.search.diagram import Diagram
 
 KIND_COLOURS = {

@@ -1,11 +1,110 @@
-"""Words and units of what an interface does."""
+"""Words and units of what an interface does, and of what a diagram is drawn over."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+
+from nldyn.system.chart import FREQUENCY, parameter_name, unit_of, words_of
+from nldyn.system.parameters import Parameter
 
 LENGTHS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 ANGLES = ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "µrad"), (1e-9, "nrad"))
+
+FORCES = ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN"))
+PREFIXED = {"m": LENGTHS, "N": FORCES}
+
+
+@dataclass(frozen=True)
+class Along:
+    """How the values along a diagram are told: of the frequency, or of another parameter.
+
+    Parameters
+    ----------
+    parameter : Parameter
+        What changes.
+    factor : float
+        The unit that is told, in SI units.
+    unit : str
+        Its name, empty for a number without one.
+
+    Examples
+    --------
+    >>> gap = Along.of(Parameter("gap"), 5e-5)
+    >>> gap.told(1.23e-5), gap.label, Along.of(THE_FREQUENCY, 90.0).told(23.0)
+    ('gap 12.3 µm', 'gap (µm)', '23 Hz')
+    """
+
+    parameter: Parameter
+    factor: float = 1.0
+    unit: str = "Hz"
+
+    @classmethod
+    def of(cls, parameter: Parameter, largest: float) -> Along:
+        """For values up to a largest one."""
+        unit = unit_of(parameter)
+        if unit in PREFIXED:
+            return cls(parameter, *axis_unit(largest, PREFIXED[unit]))
+        return cls(parameter, 1.0, "" if unit == "1" else unit)
+
+    @property
+    def in_frequency(self) -> bool:
+        """Whether it is the excitation frequency that changes."""
+        return self.parameter.name == FREQUENCY
+
+    @property
+    def column(self) -> str:
+        """Name of the column of values in SI units."""
+        return parameter_name(self.parameter)
+
+    @property
+    def noun(self) -> str:
+        """What changes."""
+        return words_of(self.parameter)
+
+    @property
+    def label(self) -> str:
+        """Name with unit, for an axis."""
+        return f"{'excitation ' * self.in_frequency}{self.head}"
+
+    @property
+    def head(self) -> str:
+        """Name with unit, for the head of a column."""
+        return f"{self.noun} ({self.unit})" if self.unit else self.noun
+
+    def told(self, value: float, digits: int = 5) -> str:
+        """A value in words."""
+        name = "" if self.in_frequency else f"{self.noun} "
+        return f"{name}{self.number(value, digits=digits)}"
+
+    def number(self, *values: float, digits: int = 5, sep: str = ", ") -> str:
+        """Values with their unit."""
+        text = sep.join(f"{value / self.factor:.{digits}g}" for value in values)
+        return f"{text} {self.unit}".rstrip()
+
+    def span(self, low: float, high: float, digits: int = 5) -> str:
+        """A range in words."""
+        return self.number(*((low, high) if high > low else (low,)), digits=digits, sep=" to ")
+
+    def range(self, low: float, high: float) -> str:
+        """The range of a diagram in words."""
+        return ("" if self.in_frequency else f"{self.noun} ") + self.span(low, high, 6)
+
+
+def axis_unit(largest: float, units: Sequence[tuple[float, str]]) -> tuple[float, str]:
+    """Choose one of some units, the largest first, for an axis that reaches up to a value.
+
+    Examples
+    --------
+    >>> axis_unit(1.3e-3, ((1.0, "s"), (1e-3, "ms")))
+    (0.001, 'ms')
+    """
+    size = abs(largest)
+    for factor, name in units:
+        if size >= 0.5 * factor:
+            return factor, name
+    return units[-1] if 0.0 < size < math.inf else units[0]
 
 
 def is_angle(direction: str) -> bool:

@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from nldyn.plot.diagram import axis_unit, branch_curve, stability_runs
-from nldyn.plot.words import is_angle, units_of
+from nldyn.plot.diagram import branch_curve, stability_runs
+from nldyn.plot.words import FORCES, Along, axis_unit, is_angle, units_of
 from nldyn.system.naming import stop_name
 
 if TYPE_CHECKING:
+    from nldyn.bifurcations.point import BranchNode
     from nldyn.branches.branch import Branch
     from nldyn.orbits.orbit import Impact, Orbit
     from nldyn.report.offline import Table
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
 Ranges = list[tuple[float, float]]
 
-FORCES = ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN"))
 Directions = Callable[[str], str]  # of interfaces by their names; empty where none is told
 MOST_RANGES = 5  # told, of many the widest
 NARROW = 1e-6  # share of a range of frequencies that counts as no gap
@@ -49,49 +49,55 @@ def answer_lines(
         A line for each, of the contacts one for each kind: forces, moments, impulses; empty where
         there is no branch.
     """
-    orbits = [orbit for branch in diagram.branches for orbit in branch.points]
-    if not orbits:
+    nodes = [node for branch in diagram.branches for node in branch.nodes]
+    if not nodes:
         return []
+    along = Along.of(diagram.parameter, max(map(abs, diagram.limits)))
     stable = joined(stable_ranges(diagram.branches), diagram.limits)
     return [
-        _peak_line(orbits, diagram.observe, direction_of(diagram.observe)),
-        *_contact_lines(orbits, direction_of),
-        f"stable and periodic: {_listed(stable)}",
-        f"nothing stable was found: {_listed(gaps(stable, diagram.limits))}",
-        f"jumps: {jumps_line(diagram.branches, special_points)}",
+        _peak_line(nodes, along, diagram.observe, direction_of(diagram.observe)),
+        *_contact_lines(nodes, along, direction_of),
+        f"stable and periodic: {_listed(stable, along)}",
+        f"nothing stable was found: {_listed(gaps(stable, diagram.limits), along)}",
+        f"jumps: {jumps_line(diagram.branches, special_points, along)}",
     ]
 
 
-def _peak_line(orbits: Sequence[Orbit], observe: str, direction: str) -> str:
-    def told(orbit: Orbit) -> str:
-        factor, unit = axis_unit(orbit.max_abs_displacement, units_of(direction))
-        return f"{orbit.max_abs_displacement / factor:.4g} {unit} at {orbit.frequency_hz:.5g} Hz"
+def _peak_line(nodes: Sequence[BranchNode], along: Along, observe: str, direction: str) -> str:
+    def told(node: BranchNode) -> str:
+        size = node.orbit.max_abs_displacement
+        factor, unit = axis_unit(size, units_of(direction))
+        return f"{size / factor:.4g} {unit} at {along.told(node.value)}"
 
     line = f"largest {'rotation' if is_angle(direction) else 'displacement'} of '{observe}': "
-    return line + _of_stable_and_all(orbits, lambda orbit: orbit.max_abs_displacement, told)
+    return line + _of_stable_and_all(nodes, lambda node: node.orbit.max_abs_displacement, told)
 
 
-def _contact_lines(orbits: Sequence[Orbit], direction_of: Directions) -> list[str]:
+def _contact_lines(
+    nodes: Sequence[BranchNode], along: Along, direction_of: Directions
+) -> list[str]:
     """The largest force or moment, and of rigid stops the largest impulse, each if there is one."""
-    stops = orbits[0].system.stops
+    stops = nodes[0].orbit.system.stops
     if not stops:
         return ["largest contact force: there are no stops"]
-    if not any(orbit.impacts for orbit in orbits):
+    if not any(node.orbit.impacts for node in nodes):
         return ["largest contact force: none, no stop is touched"]
     kinds: dict[tuple[bool, bool], list[int]] = {}
     for number, stop in enumerate(stops):
         kind = stop.impulsive, is_angle(direction_of(stop.at))
         kinds.setdefault(kind, []).append(number)
-    return [_contact_line(orbits, among, *kind) for kind, among in sorted(kinds.items())]
+    return [_contact_line(nodes, along, among, *kind) for kind, among in sorted(kinds.items())]
 
 
-def _contact_line(orbits: Sequence[Orbit], among: Sequence[int], rigid: bool, angle: bool) -> str:
+def _contact_line(
+    nodes: Sequence[BranchNode], along: Along, among: Sequence[int], rigid: bool, angle: bool
+) -> str:
     """The hardest contact with some stops, all rigid or all elastic."""
-    stops = orbits[0].system.stops
-    hits = {id(orbit): _hardest(orbit, among) for orbit in orbits}
+    stops = nodes[0].orbit.system.stops
+    hits = {id(node): _hardest(node.orbit, among) for node in nodes}
 
-    def told(orbit: Orbit) -> str:
-        hit = hits[id(orbit)]
+    def told(node: BranchNode) -> str:
+        hit = hits[id(node)]
         if hit is None:
             return f"none, no {'such ' * (len(among) < len(stops))}stop is touched"
         place = f", at {stop_name(stops, hit.stop)}" if len(stops) > 1 else ""
@@ -99,7 +105,7 @@ def _contact_line(orbits: Sequence[Orbit], among: Sequence[int], rigid: bool, an
         scale = ((1.0, "N s"),) if rigid else FORCES
         factor, unit = next((each for each in scale if value >= each[0]), scale[-1])
         unit = f"N{moment} s" if rigid else unit + moment
-        return f"{value / factor:.4g} {unit} at {orbit.frequency_hz:.5g} Hz{place}"
+        return f"{value / factor:.4g} {unit} at {along.told(node.value)}{place}"
 
     name = {
         (False, False): "largest contact force",
@@ -107,7 +113,7 @@ def _contact_line(orbits: Sequence[Orbit], among: Sequence[int], rigid: bool, an
         (True, False): "largest impulse of an impact",
         (True, True): "largest angular impulse of an impact",
     }[rigid, angle]
-    return f"{name}: " + _of_stable_and_all(orbits, lambda o: _hardness(hits[id(o)]), told)
+    return f"{name}: " + _of_stable_and_all(nodes, lambda o: _hardness(hits[id(o)]), told)
 
 
 def _hardness(hit: Impact | None) -> float:
@@ -123,11 +129,13 @@ def _hardest(orbit: Orbit, among: Sequence[int]) -> Impact | None:
 
 
 def _of_stable_and_all(
-    orbits: Sequence[Orbit], size: Callable[[Orbit], float], told: Callable[[Orbit], str]
+    nodes: Sequence[BranchNode],
+    size: Callable[[BranchNode], float],
+    told: Callable[[BranchNode], str],
 ) -> str:
     """What the largest stable orbit says, and that of all if it is larger."""
-    highest = max(orbits, key=size)
-    steady = max((orbit for orbit in orbits if orbit.stable), key=size, default=None)
+    highest = max(nodes, key=size)
+    steady = max((node for node in nodes if node.orbit.stable), key=size, default=None)
     if steady is None:
         return f"{told(highest)} (unstable; no orbit is stable)"
     if size(steady) == size(highest):
@@ -136,12 +144,12 @@ def _of_stable_and_all(
 
 
 def stable_ranges(branches: Iterable[Branch]) -> Ranges:
-    """Ranges in Hz of the stable pieces of all branches."""
+    """Ranges of the stable pieces of all branches."""
     found = []
     for branch in branches:
-        hz, _, stable = branch_curve(branch)
+        x, _, stable = branch_curve(branch)
         runs = [run for run in stability_runs(stable) if run.stable]
-        found += [(min(hz[r.start : r.stop]), max(hz[r.start : r.stop])) for r in runs]
+        found += [(min(x[r.start : r.stop]), max(x[r.start : r.stop])) for r in runs]
     return [(float(low), float(high)) for low, high in found]
 
 
@@ -176,44 +184,42 @@ def gaps(ranges: Ranges, whole: tuple[float, float]) -> Ranges:
     return [(a[1], b[0]) for a, b in pairwise(ends) if b[0] - a[1] > slack]
 
 
-def _listed(ranges: Ranges) -> str:
+def _listed(ranges: Ranges, along: Along) -> str:
     """Ranges as text; of many the widest."""
     if not ranges:
         return "nowhere"
     widest = sorted(sorted(ranges, key=lambda r: r[0] - r[1])[:MOST_RANGES])
-    text = ", ".join(
-        f"{low:.5g} to {high:.5g} Hz" if high > low else f"{low:.5g} Hz" for low, high in widest
-    )
+    text = ", ".join(along.span(low, high) for low, high in widest)
     more = len(ranges) - len(widest)
     return text + (f" and {more} narrower ranges" if more else "")
 
 
-def jumps_line(branches: Iterable[Branch], special_points: Table) -> str:
-    """Frequencies at which a stable branch ends at a fold, or where what it meets is unstable."""
+def jumps_line(branches: Iterable[Branch], special_points: Table, along: Along) -> str:
+    """Values at which a stable branch ends at a fold, or where what it meets is unstable."""
     columns, rows = special_points
     forms = iter(str(row[list(columns).index("normal_form")]) for row in rows)
     rising: set[float] = set()
     falling: set[float] = set()
     for branch in branches:
-        hz, _, stable = branch_curve(branch)
-        ends = {float(s.frequency_hz): (str(s.kind), next(forms)) for s in branch.special_points}
-        for at in range(1, hz.size - 1):
+        x, _, stable = branch_curve(branch)
+        ends = {float(s.value): (str(s.kind), next(forms)) for s in branch.special_points}
+        for at in range(1, x.size - 1):
             before, after = at - 1, at + 1
-            if float(hz[at]) not in ends or stable[before] == stable[after]:
+            if float(x[at]) not in ends or stable[before] == stable[after]:
                 continue
             inner, outer = (before, after) if stable[before] else (after, before)
-            kind, form = ends[float(hz[at])]
-            turns = (hz[at] - hz[inner]) * (hz[outer] - hz[at]) < 0.0
+            kind, form = ends[float(x[at])]
+            turns = (x[at] - x[inner]) * (x[outer] - x[at]) < 0.0
             if kind == "LP" or form.startswith("subcritical") or (kind == "GR" and turns):
-                (rising if hz[inner] < hz[at] else falling).add(float(hz[at]))
+                (rising if x[inner] < x[at] else falling).add(float(x[at]))
     told = [
-        f"as the frequency {word} past {_few(sorted(places))} Hz"
+        f"as the {along.noun} {word} past {_few(sorted(places), along)}"
         for word, places in (("rises", rising), ("falls", falling))
         if places
     ]
     return "; ".join(told) or "none was found"
 
 
-def _few(places: Sequence[float]) -> str:
-    text = ", ".join(f"{hz:.5g}" for hz in places[:MOST_RANGES])
-    return text + (f" and {len(places) - MOST_RANGES} more" if len(places) > MOST_RANGES else "")
+def _few(places: Sequence[float], along: Along) -> str:
+    more = f" and {len(places) - MOST_RANGES} more" if len(places) > MOST_RANGES else ""
+    return along.number(*places[:MOST_RANGES]) + more

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from nldyn.orbits.orbit import Orbit
-from nldyn.plot.diagram import axis_unit, length_unit
+from nldyn.plot.diagram import length_unit
+from nldyn.plot.words import axis_unit
 from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy
 from nldyn.reduction.model_errors import (
     EIGENFREQUENCIES,

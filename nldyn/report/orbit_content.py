@@ -14,11 +14,12 @@ from fem.render.viewer import packed
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError
 from nldyn.branches.branch import Branch
+from nldyn.orbits.axis import Axis
 from nldyn.orbits.harmonics import harmonics
 from nldyn.orbits.orbit import Orbit
 from nldyn.plot.diagram import MARKER_NAMES, beside_stable, orbit_title, stop_places
 from nldyn.plot.orbit import FLOOR, drawn_phases, motion_at
-from nldyn.plot.words import is_angle
+from nldyn.plot.words import Along, is_angle
 from nldyn.system.naming import stop_name
 
 MOST_POINTS = 120  # that can be looked at, beside the special points
@@ -143,13 +144,16 @@ def samples_each(orbits: int) -> int:
     return int(np.clip(ALL_SAMPLES // max(orbits, 1), *SAMPLES))
 
 
-def orbit_content(chosen: ChosenOrbit, samples: int = SAMPLES[1]) -> dict[str, Any]:
+def orbit_content(
+    chosen: ChosenOrbit, axis: Axis, along: Along, samples: int = SAMPLES[1]
+) -> dict[str, Any]:
     """What a page shows of an orbit, ready for JSON; arrays are packed as 32-bit numbers.
 
     In SI units, at about so many instants of a period. What cannot be computed is told under
     ``fault``, and then the rest is missing.
     """
-    orbit = chosen.orbit
+    orbit, value = chosen.orbit, axis.value(chosen.orbit)
+    place = "" if along.in_frequency else f", {along.told(value, 7)}"
     told = {
         "branch": chosen.branch,
         "place": chosen.place,
@@ -157,8 +161,10 @@ def orbit_content(chosen: ChosenOrbit, samples: int = SAMPLES[1]) -> dict[str, A
         "name": chosen.name,
         "period": orbit.period,
         "hz": float(orbit.frequency_hz),
+        "x": float(value) / along.factor,
         "y": float(orbit.max_abs_displacement),
-        "title": orbit_title(orbit, digits=7),
+        "title": orbit_title(orbit, digits=7) + place,
+        "walls": stop_places(orbit.system, orbit.observe),
         "stable": bool(orbit.stable),
     }
     try:
@@ -251,11 +257,10 @@ def shown_phases(orbit: Orbit, count: int, first: float) -> Real:
 
 
 def stops_of(orbit: Orbit, direction_of: Callable[[str], str]) -> dict[str, Any]:
-    """The stops' names, which act on rotations, and where the observed interface meets some."""
+    """The stops' names, and which act on rotations."""
     system = orbit.system
     return {
         "names": [stop_name(system.stops, index) for index in range(len(system.stops))],
-        "places": stop_places(system, orbit.observe),
         "turn": [is_angle(direction_of(stop.at)) for stop in system.stops],
     }
 

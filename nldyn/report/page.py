@@ -16,15 +16,15 @@ from nldyn.branches.branch import Branch
 from nldyn.plot.diagram import (
     MANY_MARKS,
     MARKER_NAMES,
-    axis_unit,
     beside_stable,
     branch_curve,
     orbit_text,
     period_colours,
     period_name,
     stability_runs,
+    stop_places,
 )
-from nldyn.plot.words import displacement_of, is_angle, units_of
+from nldyn.plot.words import Along, axis_unit, displacement_of, is_angle, units_of
 from nldyn.report.deflection import surface_content
 from nldyn.report.offline import Table, as_table, versions, write_html
 from nldyn.report.orbit_content import (
@@ -40,6 +40,7 @@ from nldyn.report.orbit_content import (
 from nldyn.report.stop_spheres import not_drawn
 from nldyn.scene.build import direction_at, directions_of
 from nldyn.search.diagram import Diagram
+from nldyn.system.chart import THE_FREQUENCY, parameter_name
 
 if TYPE_CHECKING:
     import cms
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
     from nldyn.scene.schema import Scene
 
 MOST_POINTS = 10_000  # of all branches together that are drawn and listed
-NO_STOPS: dict[str, Any] = {"names": [], "places": [], "turn": []}
+NO_STOPS: dict[str, Any] = {"names": [], "turn": []}
 LINE = 62  # letters in a line of what is shown at the pointer
 
 
@@ -132,32 +133,37 @@ def page_content(
     heights = [[node.orbit.max_abs_displacement for node in branch.nodes] for branch in told]
     direction = direction_at(scene, diagram.observe) if scene else ""
     factor, unit = axis_unit(max((max(y) for y in heights), default=1.0), units_of(direction))
+    along = Along.of(diagram.parameter, max(map(abs, diagram.limits)))
     turns = turning(branches, direction, directions_of(scene))
     chosen = chosen_orbits(branches, heights)
     kept = kept_points(branches)
     notes = [*notes, *dict.fromkeys(diagram.notes), *limits(diagram, chosen, kept)]
     samples = samples_each(len(chosen))
-    orbits = [orbit_content(each, samples) for each in chosen]
+    orbits = [orbit_content(each, diagram.axis, along, samples) for each in chosen]
     content: dict[str, Any] = {
         "title": (scene.title if scene else "") or "Bifurcation diagram",
         "answer": summary.get("answer", []),
-        "range_hz": list(diagram.limits),
+        "range": [value / along.factor for value in diagram.limits],
+        "span": along.range(*diagram.limits) + told_frequency(diagram),
+        "along": along.label,
+        "place": ["" if along.in_frequency else f"{along.noun} ", along.unit],
         "observed": displacement_of(diagram.observe, direction),
         "angle": "max_abs_displacement" in turns,
-        "natural_hz": branches[0].points[0].system.frequencies_hz.tolist() if branches else [],
+        "natural_hz": natural_hz(diagram),
+        "gaps": gaps_of(diagram),
         "many": MANY_MARKS,
         "factor": factor,
         "unit": unit,
         "yscale": yscale,
         "notes": notes,
-        "branches": drawn_branches(told, kept, factor, unit),
-        "special": special_marks(told, factor, unit),
+        "branches": drawn_branches(told, kept, along, factor, unit),
+        "special": special_marks(told, along, factor, unit),
         "kinds": MARKER_NAMES,
         "stops": stops_of(branches[0].points[0], directions_of(scene)) if branches else NO_STOPS,
         "orbits": orbits,
         "tables": {
-            "special points": special_table(tables["special_points"], factor, unit),
-            "branches": in_radians(branch_table(branches, tables), turns),
+            "special points": special_table(tables["special_points"], along, factor, unit),
+            "branches": in_radians(branch_table(branches, tables, along), turns),
             "points": in_radians(as_table(kept_rows(tables["points"], branches, kept)), turns),
         },
         "errors": error_table(diagram, tables, summary, orbits),
@@ -174,11 +180,31 @@ def page_content(
     return content
 
 
+def told_frequency(diagram: Diagram) -> str:
+    """At which frequency a diagram is drawn over another parameter."""
+    return "" if diagram.frequency_hz is None else f", at {diagram.frequency_hz:g} Hz"
+
+
+def natural_hz(diagram: Diagram) -> list[float]:
+    """Natural frequencies in Hz to be drawn in a diagram over the frequency."""
+    if not diagram.branches or diagram.parameter != THE_FREQUENCY:
+        return []
+    found: list[float] = diagram.branches[0].points[0].system.frequencies_hz.tolist()
+    return found
+
+
+def gaps_of(diagram: Diagram) -> list[float]:
+    """Distances in m at which the observed interface meets stops, where these do not change."""
+    if not diagram.branches or diagram.parameter.name == "gap":
+        return []
+    orbit = diagram.branches[0].points[0]
+    return sorted({abs(place) for place in stop_places(orbit.system, orbit.observe)})
+
+
 @dataclass(frozen=True)
 class ToldOrbit:
     """What the tables tell of an orbit, as far as it is drawn."""
 
-    frequency_hz: float
     max_abs_displacement: float
     impacts: int
     stable: bool = False
@@ -191,11 +217,7 @@ class ToldPoint:
 
     orbit: ToldOrbit
     arclength: float
-
-    @property
-    def value(self) -> float:
-        """That of the frequency, in which a diagram is drawn."""
-        return self.orbit.frequency_hz
+    value: float
 
 
 @dataclass(frozen=True)
@@ -225,18 +247,19 @@ class ToldBranch:
 def told_branches(diagram: Diagram, tables: Mapping[str, Table]) -> list[ToldBranch]:
     """The branches of a diagram, with the numbers of its tables."""
     points, special = records(tables["points"]), records(tables["special_points"])
+    name_of_value = parameter_name(diagram.parameter)
     found = []
     for branch in diagram.branches:
         nodes = [
             ToldPoint(
                 ToldOrbit(
-                    row["frequency_hz"],
                     row["max_abs_displacement_m"],
                     row["impacts"],
                     bool(row["stable"]),
                     row["largest_multiplier"],
                 ),
                 node.arclength,
+                row[name_of_value],
             )
             for node, row in zip(branch.nodes, points, strict=False)
         ]
@@ -244,8 +267,9 @@ def told_branches(diagram: Diagram, tables: Mapping[str, Table]) -> list[ToldBra
             ToldSpecial(
                 str(row["type"]),
                 ToldPoint(
-                    ToldOrbit(row["frequency_hz"], row["max_abs_displacement_m"], row["impacts"]),
+                    ToldOrbit(row["max_abs_displacement_m"], row["impacts"]),
                     each.point.arclength,
+                    row[name_of_value],
                 ),
                 str(row["meaning"]),
             )
@@ -294,19 +318,23 @@ def limits(
 
 
 def drawn_branches(
-    branches: Sequence[ToldBranch], kept: Sequence[Sequence[int]], factor: float, unit: str
+    branches: Sequence[ToldBranch],
+    kept: Sequence[Sequence[int]],
+    along: Along,
+    factor: float,
+    unit: str,
 ) -> list[dict[str, Any]]:
     """Lines and points of the branches; displacements in units of ``factor`` metres."""
     colours = period_colours(branch.period for branch in branches)
     found = []
     for branch, numbers in zip(branches, kept, strict=True):
-        hz, y, stable = branch_curve(cast("Branch", branch))
+        x, y, stable = branch_curve(cast("Branch", branch))
         step = -(-len(branch.nodes) // max(len(numbers), 1))
-        orbits = [branch.nodes[i].orbit for i in numbers]
+        nodes = [branch.nodes[i] for i in numbers]
         runs = [
             {
                 "stable": run.stable,
-                "x": rounded(thinned(hz[run.start : run.stop], step)),
+                "x": rounded(thinned(x[run.start : run.stop], step) / along.factor),
                 "y": rounded(thinned(y[run.start : run.stop], step) / factor),
             }
             for run in stability_runs(stable)
@@ -319,18 +347,21 @@ def drawn_branches(
                 "colour": colours[branch.period],
                 "runs": runs,
                 "numbers": list(numbers),
-                "x": rounded(orbit.frequency_hz for orbit in orbits),
-                "y": rounded(orbit.max_abs_displacement / factor for orbit in orbits),
+                "x": rounded(node.value / along.factor for node in nodes),
+                "y": rounded(node.orbit.max_abs_displacement / factor for node in nodes),
                 "text": [
-                    orbit_text(cast("Orbit", orbit), factor, unit).replace("\n", "<br>")
-                    for orbit in orbits
+                    orbit_text(cast("Orbit", node.orbit), along.told(node.value, 7), factor, unit)
+                    .replace("\n", "<br>")
+                    for node in nodes
                 ],
             }
         )
     return found
 
 
-def special_marks(branches: Sequence[ToldBranch], factor: float, unit: str) -> list[dict[str, Any]]:
+def special_marks(
+    branches: Sequence[ToldBranch], along: Along, factor: float, unit: str
+) -> list[dict[str, Any]]:
     """Special points with what they mean, in the order of their table."""
     return [
         {
@@ -338,7 +369,7 @@ def special_marks(branches: Sequence[ToldBranch], factor: float, unit: str) -> l
             "index": index,
             "kind": special.kind,
             "beside_stable": beside_stable(cast("Branch", branch), cast("SpecialPoint", special)),
-            "x": float(f"{special.orbit.frequency_hz:.9g}"),
+            "x": float(f"{special.point.value / along.factor:.9g}"),
             "y": float(f"{special.orbit.max_abs_displacement / factor:.9g}"),
             "sentence": special.meaning,
             "text": "<br>".join(textwrap.wrap(html.escape(special.meaning), LINE)),
@@ -348,23 +379,23 @@ def special_marks(branches: Sequence[ToldBranch], factor: float, unit: str) -> l
     ]
 
 
-def special_table(table: Table, factor: float, unit: str) -> dict[str, Any]:
+def special_table(table: Table, along: Along, factor: float, unit: str) -> dict[str, Any]:
     """What special points mean, first, and where they are; special_points.csv has every digit.
 
     Examples
     --------
     >>> names = ("meaning", "type", "frequency_hz", "max_abs_displacement_m", "branch")
     >>> row = ("A fold.", "LP", 20.123456789, 1.23456789e-4, "1/1")
-    >>> special_table((names, [row]), 1e-6, "µm")["rows"]
+    >>> special_table((names, [row]), Along(THE_FREQUENCY), 1e-6, "µm")["rows"]
     [['A fold.', 'LP', 20.1235, 123.457, '1/1', None, None]]
     """
     size_name = f"largest {'rotation' if unit.endswith('rad') else 'displacement'} ({unit})"
     rows = []
     for row in records(table):
-        hz, size = row["frequency_hz"], row["max_abs_displacement_m"] / factor
-        told = [row["meaning"], row["type"], float(f"{hz:.6g}"), float(f"{size:.6g}")]
+        value, size = row[along.column] / along.factor, row["max_abs_displacement_m"] / factor
+        told = [row["meaning"], row["type"], float(f"{value:.6g}"), float(f"{size:.6g}")]
         rows.append([*told, row["branch"], row.get("period"), row.get("impacts")])
-    columns = ["meaning", "type", "frequency_hz", size_name]
+    columns = ["meaning", "type", along.head, size_name]
     return {"columns": [*columns, "branch", "period", "impacts"], "rows": rows}
 
 
@@ -419,10 +450,13 @@ def kept_rows(table: Table, branches: Sequence[Branch], kept: Sequence[Sequence[
     return columns, wanted
 
 
-def branch_table(branches: Sequence[Branch], tables: Mapping[str, Table]) -> dict[str, Any]:
+def branch_table(
+    branches: Sequence[Branch], tables: Mapping[str, Table], along: Along
+) -> dict[str, Any]:
     """Branches, one a row: where they go, why they end, and the largest errors along them."""
     columns = (
-        "branch", "period", "points", "special_points", "lowest_hz", "highest_hz",
+        "branch", "period", "points", "special_points", f"lowest {along.head}",
+        f"highest {along.head}",
         "max_abs_displacement_m", "stable_points", "largest_relative_error",
         "largest_liouville_error", "largest_uncertainty", "first_end", "last_end",
     )  # fmt: skip
@@ -430,15 +464,15 @@ def branch_table(branches: Sequence[Branch], tables: Mapping[str, Table]) -> dic
     rows = []
     for branch in branches:
         told = [next(points) for _ in branch.points]
-        hz = [row["frequency_hz"] for row in told]
+        values = [row[along.column] / along.factor for row in told]
         rows.append(
             [
                 branch.name,
                 branch.period,
                 len(told),
                 len(branch.special_points),
-                min(hz),
-                max(hz),
+                min(values),
+                max(values),
                 max(row["max_abs_displacement_m"] for row in told),
                 sum(int(row["stable"]) for row in told),
                 largest([orbit.error for orbit in branch.points]),
@@ -500,8 +534,8 @@ def error_table(
             "the unit circle lies within the uncertainty",
         ],
         [
-            "error of the frequencies of special points, relative",
-            largest([each.frequency_error for each in special]),
+            "error of the places of special points, relative",
+            largest([each.error for each in special]),
             "estimated; the largest of all",
         ],
     ]

@@ -13,6 +13,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 from nldyn.base.version import software_version
 from nldyn.bifurcations.normal_forms import normal_form
 from nldyn.branches.cascades import cascades_in
@@ -26,8 +28,11 @@ from nldyn.report.page import write_page
 from nldyn.runtime.result_directory import result_directory
 from nldyn.scene.build import direction_at, directions_of
 from nldyn.search.exploration import Exploration
+from nldyn.system.chart import THE_FREQUENCY, parameter_name
+from nldyn.system.parameters import Parameter
 
 if TYPE_CHECKING:
+    from nldyn.bifurcations.point import BranchNode
     from nldyn.branches.branch import Branch
     from nldyn.branches.cascades import Cascade
     from nldyn.report.page import Drawn
@@ -76,7 +81,7 @@ FILES = {
     "special_points": "special_points.csv",
     "ends": "ends.csv",
 }
-COVERAGE_COLUMNS = ("frequency_hz", "periods", "settled", "unsettled", "failed")
+COVERAGE_COLUMNS = ("periods", "settled", "unsettled", "failed")
 
 
 def write_results(
@@ -134,7 +139,8 @@ def write_results(
             write_table(folder / FILES[part], columns, rows)
         save(found, folder / "branches.h5")
         if exploration is not None:
-            write_table(folder / "coverage.csv", COVERAGE_COLUMNS, coverage_rows(exploration))
+            columns = (parameter_name(diagram.parameter), *COVERAGE_COLUMNS)
+            write_table(folder / "coverage.csv", columns, coverage_rows(exploration))
         title = scene.title if scene else ""
         direction = direction_at(scene, diagram.observe) if scene else ""
         save_diagram(diagram, folder, title=title, direction=direction, yscale=yscale)
@@ -153,18 +159,29 @@ def write_results(
 def tables_of(diagram: Diagram) -> dict[str, Table]:
     """The tables of points, special points and ends; normal forms of special points take time."""
     return {
-        "points": (BRANCH_COLUMNS, list(branch_rows(diagram))),
-        "special_points": (SPECIAL_COLUMNS, list(special_rows(diagram))),
-        "ends": (END_COLUMNS, list(end_rows(diagram))),
+        "points": (with_value(BRANCH_COLUMNS, diagram.parameter), list(branch_rows(diagram))),
+        "special_points": (
+            with_value(SPECIAL_COLUMNS, diagram.parameter), list(special_rows(diagram))
+        ),
+        "ends": (with_value(END_COLUMNS, diagram.parameter), list(end_rows(diagram))),
     }
+
+
+def with_value(columns: tuple[str, ...], parameter: Parameter) -> tuple[str, ...]:
+    """Columns with that of the parameter before the frequency, where it is another one."""
+    at = columns.index("frequency_hz")
+    return (*columns[:at], *dict.fromkeys((parameter_name(parameter), *columns[at:])))
 
 
 def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
     """Give the rows of ``branches.csv``, one for each point of each branch."""
+    names = with_value(BRANCH_COLUMNS, diagram.parameter)[2:]
     for branch in diagram.branches:
-        columns = orbit_columns(branch.points, diagram.limits)
+        values = np.array([node.value for node in branch.nodes])
+        columns = {parameter_name(diagram.parameter): values}
+        columns |= orbit_columns(branch.points, diagram.limits)
         columns["stable"] = columns["stable"].astype(int)
-        rows = zip(*(columns[name].tolist() for name in BRANCH_COLUMNS[2:]), strict=True)
+        rows = zip(*(columns[name].tolist() for name in names), strict=True)
         for number, row in enumerate(rows):
             yield (branch.name, number, *map(if_known, row))
 
@@ -176,13 +193,19 @@ def end_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
         for name, reason, index in ends:
             orbit = branch.points[index]
             broken = reason.broken_off or reason.ending is Ending.NOT_FINISHED
-            hz = at_known(orbit.frequency_hz, diagram.limits)
             size = float(orbit.max_abs_displacement)
-            yield (branch.name, name, hz, size, int(broken), reason)
+            where = place(diagram, branch.nodes[index])
+            yield (branch.name, name, *where, size, int(broken), reason)
+
+
+def place(diagram: Diagram, node: BranchNode) -> tuple[float, ...]:
+    """The frequency of a point, and before it the value of another parameter that changes."""
+    hz = at_known(node.orbit.frequency_hz, diagram.limits)
+    return (hz,) if diagram.parameter == THE_FREQUENCY else (node.value, hz)
 
 
 def coverage_rows(found: Exploration) -> Iterable[tuple[object, ...]]:
-    """Give the rows of ``coverage.csv``, one for each frequency."""
+    """Give the rows of ``coverage.csv``, one for each value."""
     for c in found.coverage:
         periods = " ".join(map(str, c.periods))
         yield (c.value, periods, c.settled, c.unsettled, c.failed)
@@ -204,7 +227,7 @@ def special_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
                 branch.name,
                 orbit.period,
                 str(point.kind),
-                float(orbit.frequency_hz),
+                *place(diagram, point.point),
                 float(orbit.max_abs_displacement),
                 int(orbit.impacts),
                 form.name,
@@ -233,7 +256,9 @@ def summary(diagram: Diagram) -> dict[str, object]:
         "largest_liouville_error": worst(orbit.liouville_error for orbit in orbits),
         "stability_undecided": sum(orbit.stability.verdict == "undecided" for orbit in orbits),
         "notes": list(diagram.notes),
-        "branches": [_branch_summary(branch, diagram.limits) for branch in diagram.branches],
+        "parameter": parameter_name(diagram.parameter),
+        "frequency_hz": diagram.frequency_hz,
+        "branches": [_branch_summary(branch, diagram) for branch in diagram.branches],
         "cascades": [_cascade_summary(cascade) for cascade in cascades_in(diagram.branches)],
     }
 
@@ -246,18 +271,18 @@ def software_name() -> str:
 def _cascade_summary(cascade: Cascade) -> dict[str, object]:
     return {
         "periods": [flip.orbit.period for flip in cascade.flips],
-        "flips_hz": [float(flip.frequency_hz) for flip in cascade.flips],
+        "flips": [float(flip.value) for flip in cascade.flips],
         "ratios": [float(ratio.value) for ratio in cascade.ratios],
     }
 
 
-def _branch_summary(branch: Branch, range_hz: tuple[float, float]) -> dict[str, object]:
-    hz = [at_known(orbit.frequency_hz, range_hz) for orbit in branch.points]
+def _branch_summary(branch: Branch, diagram: Diagram) -> dict[str, object]:
+    values = [place(diagram, node)[0] for node in branch.nodes]
     return {
         "name": branch.name,
         "period": branch.period,
-        "points": len(hz),
-        "range_hz": [min(hz), max(hz)] if hz else None,
+        "points": len(values),
+        "range": [min(values), max(values)] if values else None,
         "special_points": len(branch.special_points),
         "stop_reason": str(branch.stop_reason),
     }

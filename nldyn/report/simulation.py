@@ -16,9 +16,9 @@ from nldyn.longterm.impacts import Impacts
 from nldyn.longterm.simulation import Motion
 from nldyn.orbits.history import History
 from nldyn.orbits.orbit import check_observe
-from nldyn.plot.diagram import PERIOD_COLOURS, axis_unit, file_axes, save_figure
+from nldyn.plot.diagram import PERIOD_COLOURS, file_axes, save_figure
 from nldyn.plot.longterm import plot_sweep
-from nldyn.plot.words import displacement_of, units_of
+from nldyn.plot.words import axis_unit, displacement_of, units_of
 from nldyn.report.results import write_table
 from nldyn.runtime.result_directory import result_directory
 

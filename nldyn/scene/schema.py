@@ -855,8 +855,9 @@ class ContinuationTable(Table):
     @property
     def limits(self) -> tuple[float, float]:
         """Lowest and highest frequency in Hz, or value of the parameter."""
-        low, high = self.range_hz or self.range or ()
-        return low, high
+        given = self.range_hz or self.range
+        assert given is not None
+        return given[0], given[1]
 
     @property
     def frequencies_hz(self) -> tuple[float, float]:

@@ -332,10 +332,10 @@ def diagrams_of(values: Mapping[str, object]) -> dict[str, Diagram]:
 
 def _joined(parts: Sequence[Diagram]) -> Diagram:
     """The parts of a job as one."""
-    low = min(part.range_hz[0] for part in parts)
+    low = min(part.limits[0] for part in parts)
     return replace(
         parts[0],
-        range_hz=(low, parts[0].range_hz[1]),
+        limits=(low, parts[0].limits[1]),
         branches=tuple(branch for part in parts for branch in part.branches),
         notes=tuple(note for part in parts for note in part.notes),
     )

@@ -78,7 +78,7 @@ def test_the_ends_of_the_range_are_written_as_they_were_given(tmp_path):
     written = [row[3] for row in read(tmp_path / "out" / "branches.csv")[1:]]
     assert written == ["5.0", repr(stored[1]), "90.0"]
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert summary["branches"][0]["range_hz"] == [5.0, 90.0]
+    assert summary["branches"][0]["range"] == [5.0, 90.0]
 
 
 def test_summary(tmp_path):

@@ -23,6 +23,7 @@ from nldyn import (
     index_sum,
     solve_orbit,
 )
+from nldyn.orbits.axis import Axis
 from nldyn.search.fixed_point_index import index, index_gaps, index_note
 
 
@@ -92,7 +93,7 @@ def test_a_crossing_found_from_the_other_branch_has_its_place_on_this_one():
 
 
 def test_the_note_tells_that_all_is_missing_where_there_is_no_branch():
-    told = index_note([], (28.0, 60.0), 1)
+    told = index_note([], Axis.in_frequency((28.0, 60.0)), 1)
     assert " but for P from 28 to 60 Hz: orbits are missing" in told
 
 
@@ -123,10 +124,10 @@ def test_the_note_tells_for_each_power_where_orbits_are_missing(doubled):
     (flip,) = [s.frequency_hz for s in harmonic[0].special_points if s.kind == "PD"]
     assert index_gaps(harmonic, (low, high), 2) == [pytest.approx((flip, high), rel=1e-12)]
     where = f"P^2 from {flip:.10g} to 60 Hz"
-    told = index_note(harmonic, (low, high), 3)
+    told = index_note(harmonic, Axis.in_frequency((low, high)), 3)
     assert told.startswith("indices of the fixed points of P to P^3 add up to one from 28 to 60 ")
     assert told.endswith(f" but for {where}: orbits are missing, or a branch was broken off")
-    assert index_note(harmonic, (low, flip), 3).endswith(
+    assert index_note(harmonic, Axis.in_frequency((low, flip)), 3).endswith(
         f" add up to one from 28 to {flip:g} Hz; isolas that are missing as a whole would not "
         "change that"
     )

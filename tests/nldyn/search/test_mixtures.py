@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from problems import section_of
 
 from nldyn.orbits.axis import Axis
 from nldyn.search import Mixtures
@@ -57,12 +58,13 @@ def test_an_orbit_is_begun_at_each_of_its_periods_and_goes_on_in_its_order():
 
 
 def loops_of(branches, frequency_hz, longest=3, seed=0):
-    return Loops.of(branches, frequency_hz, longest, np.random.default_rng(seed))
+    here = section_of(branches[0], frequency_hz)
+    return Loops.of(branches, here, longest, np.random.default_rng(seed))
 
 
 def test_loops_are_motions_over_the_period_of_the_orbit(three):
     for branch in three.branches:
-        loops, orbits = loops_of([branch], 36.5), orbits_near(branch, 36.5)
+        loops, orbits = loops_of([branch], 36.5), orbits_near(branch, section_of(branch, 36.5))
         assert len(loops.nodes) == len(orbits) > 1
         for nodes, orbit in zip(loops.nodes, orbits, strict=True):
             assert nodes.shape == (branch.period, NODES, 2)

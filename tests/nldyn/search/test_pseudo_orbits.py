@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from problems import section_of
 
 from nldyn.orbits.starts import nearest_orbit
 from nldyn.search import pseudo_orbits
@@ -38,7 +39,7 @@ def test_short_steps_between_more_states_lead_back_to_an_orbit_more_often(three)
 
 
 def test_pieces_are_motions_over_one_period_of_the_excitation(three):
-    pieces = Pieces.of(three.branches, 36.5, 1e-9)
+    pieces = Pieces.of(three.branches, section_of(three.branches[0], 36.5), 1e-9)
     flow = three.branches[0].points[0].problem.flow
     assert sorted(set(pieces.period.tolist())) == [1, 2, 3]
     for nodes, end in zip(pieces.nodes, pieces.ends, strict=True):
@@ -49,15 +50,15 @@ def test_pieces_are_motions_over_one_period_of_the_excitation(three):
 def test_orbits_on_either_side_of_a_fold_are_two(three):
     (third,) = three.of_period(3)
     fold = max(s.frequency_hz for s in third.special_points if s.kind == "LP")
-    pieces = Pieces.of([third], 0.99 * fold, 1e-9)
+    pieces = Pieces.of([third], section_of(third, 0.99 * fold), 1e-9)
     assert len(third.at(0.99 * fold)) == len(set(pieces.passage.tolist())) == 2
 
 
 def test_a_narrow_branch_gives_pieces_although_it_does_not_reach_the_frequency(three):
     (third,) = three.of_period(3)
     highest = third.frequency_hz.max()
-    assert Pieces.of([third], highest * 1.005, 0.01).branch.size
-    assert not Pieces.of([third], highest * 1.02, 0.01).branch.size
+    assert Pieces.of([third], section_of(third, highest * 1.005), 0.01).branch.size
+    assert not Pieces.of([third], section_of(third, highest * 1.02), 0.01).branch.size
 
 
 def test_pieces_of_one_orbit_in_its_order_are_the_orbit():

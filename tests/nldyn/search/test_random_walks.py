@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from problems import make_one_dof
+from problems import make_one_dof, section, section_of
 
 from nldyn import Stop
 from nldyn.flow.flow_map import FlowMap
@@ -135,12 +135,13 @@ def test_known_orbits_near_a_frequency_tell_where_states_lie_and_no_others(three
     (harmonic,), (third,) = three.of_period(1), three.of_period(3)
     above = 1.01 * (1.0 + WINDOW) * third.frequency_hz.max()
     motions, with_near, with_far = (
-        _known_states(flow, branches, above, np.random.default_rng(0))
+        _known_states(section(flow, above), branches, np.random.default_rng(0))
         for branches in ([], [harmonic], [third])
     )
     assert np.array_equal(with_near[: len(motions)], motions)
     assert np.array_equal(with_far, motions)
-    orbits = np.vstack([stroboscopic(orbit) for orbit in orbits_near(harmonic, above)])
+    near = orbits_near(harmonic, section_of(harmonic, above))
+    orbits = np.vstack([stroboscopic(orbit) for orbit in near])
     assert np.array_equal(with_near[len(motions) :], orbits)
 
 
@@ -164,7 +165,7 @@ def test_states_that_cannot_be_carried_on_are_left_out(monkeypatch):
     nothing = StateGraph.of(flow, OMEGA, cloud, 200, np.random.default_rng(0))
     assert list(nothing.closed_walks(3, np.random.default_rng(0))) == []
     box = SimpleNamespace(flow=flow, tell=lambda *_: None)
-    place = Place(37.0, 0.01, range(1, 3), np.random.default_rng(0))
+    place = Place(section(flow, 37.0), 0.01, range(1, 3), np.random.default_rng(0))
     assert list(ClosedWalks(states=50, tries=5).guesses(box, [], place)) == []
 
 
