@@ -53,15 +53,15 @@ def check_frequency(name: str, value: object) -> None:
         )
 
 
-def check_range(limits: tuple[float, float], name: str = "limits") -> tuple[float, float]:
+def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:
     """A frequency range as two floats, or a SystemModelError that says what is wrong."""
-    ends = numbers(name, limits)
+    ends = numbers("range_hz", range_hz)
     if ends.shape != (2,):
-        raise SystemModelError(f"{name} must be two frequencies, got {shown(limits)}")
+        raise SystemModelError(f"range_hz must be two frequencies, got {shown(range_hz)}")
     low, high = ends.tolist()
     if not SMALLEST_FREQUENCY <= low < high <= LARGEST_FREQUENCY:
         raise SystemModelError(
-            f"{name} must be two positive frequencies, ascending, from {SMALLEST_FREQUENCY:g} "
+            f"range_hz must be two positive frequencies, ascending, from {SMALLEST_FREQUENCY:g} "
             f"to {LARGEST_FREQUENCY:g}; got ({low:g}, {high:g})"
         )
     return low, high

@@ -37,7 +37,7 @@ from nldyn.orbits.shooting import shifts
 from nldyn.runtime.prefetch import Ahead
 from nldyn.runtime.progress import of_value, shows_progress
 from nldyn.runtime.threads import one_thread
-from nldyn.system.chart import FREQUENCY, Chart, told_value, value_of
+from nldyn.system.chart import Chart, told_value, value_of
 from nldyn.system.parameters import Parameter
 
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins

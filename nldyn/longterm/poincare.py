@@ -222,7 +222,7 @@ def brute_force(
     flow = flow_of(system)
     check_types(directions=(directions, Sequence), options=(options, AttractorOptions, None))
     check_execution(executor, progress)
-    low, high = check_range(range_hz, "range_hz")
+    low, high = check_range(range_hz)
     check_whole("points", points, 1, MOST_POINTS)
     check_whole("starts", starts, 0, MOST_POINTS)
     check_whole("recorded", recorded, 1, MOST_POINTS)

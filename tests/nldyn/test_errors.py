@@ -287,21 +287,21 @@ def test_guess(one_dof):
 
 @given(BAD | st.just(0.0))
 def test_range(one_dof, orbit, value):
-    sentence(lambda: continue_branch(orbit, (value, 90.0)), "limits")
-    sentence(lambda: continue_branch(orbit, (20.0, value)), "limits")
-    sentence(lambda: diagram(one_dof, (value, 90.0)), "limits")
+    sentence(lambda: continue_branch(orbit, (value, 90.0)), "the range of")
+    sentence(lambda: continue_branch(orbit, (20.0, value)), "the range of")
+    sentence(lambda: diagram(one_dof, (value, 90.0)), "the range of")
 
 
 @pytest.mark.parametrize("range_hz", ["ab", None, ("a", 90.0), [[5.0], [90.0, 95.0]]])
 def test_range_that_is_not_two_numbers(one_dof, orbit, range_hz):
-    sentence(lambda: continue_branch(orbit, range_hz), "limits")
-    sentence(lambda: diagram(one_dof, range_hz), "limits")
+    sentence(lambda: continue_branch(orbit, range_hz), "range")
+    sentence(lambda: diagram(one_dof, range_hz), "the range of")
 
 
 def test_range_that_is_empty_or_elsewhere(orbit):
-    sentence(lambda: continue_branch(orbit, (90.0, 5.0)), "limits", "ascending")
-    sentence(lambda: continue_branch(orbit, (5.0,)), "limits", "two frequencies", "got (5.0,)")
-    sentence(lambda: continue_branch(orbit, 30.0), "limits", "two frequencies", "got 30.0")
+    sentence(lambda: continue_branch(orbit, (90.0, 5.0)), "the range of", "ascending")
+    sentence(lambda: continue_branch(orbit, (5.0,)), "the range of", "two numbers", "got (5.0,)")
+    sentence(lambda: continue_branch(orbit, 30.0), "the range of", "two numbers", "got 30.0")
     sentence(lambda: continue_branch(orbit, (30.0, 90.0)), "orbit at 26 Hz", "outside")
 
 
