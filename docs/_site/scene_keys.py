@@ -10,7 +10,7 @@ import ast
 import inspect
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -21,7 +21,7 @@ from nldyn.scene import schema
 PAGE = Path(__file__).resolve().parents[1] / "reference" / "scene.md"
 HEAD = "| key | type | unit | default | meaning |\n|---|---|---|---|---|\n"
 TABLE = re.compile(r"^\| key \|.*\n(?:\|.*\n)+", flags=re.M)
-NAME = re.compile(r"`\[+([\w.]+)\]+`")
+NAME = re.compile(r"`\[+([\w.]+)\]+`(?:`? with `+law = \"(\w+)\")?")
 KINDS = {"string": "text", "number": "number", "integer": "whole number", "boolean": "true, false"}
 BOUNDS = (
     ("above", ("exclusiveMinimum", "gt")),
@@ -34,17 +34,28 @@ BOUNDS = (
 def tables() -> dict[str, type[schema.Table]]:
     """The tables of a scene by the names that their docstrings begin with; "" is its top.
 
+    Those of one law have it behind the name.
+
     Examples
     --------
     >>> tables()["stops"].__name__
     'StopTable'
     """
-    named = {
-        found[1]: table
-        for table in schema.Table.__subclasses__()
-        if (found := NAME.search(table.__doc__ or ""))
-    }
-    return {"": schema.Scene, **named}
+    named = {name_of(table.__doc__ or ""): table for table in subclasses(schema.Table)}
+    return {**named, "": schema.Scene}
+
+
+def subclasses(table: type[schema.Table]) -> Iterator[type[schema.Table]]:
+    """All classes made of one."""
+    for each in table.__subclasses__():
+        yield each
+        yield from subclasses(each)
+
+
+def name_of(text: str) -> str:
+    """The name of the table that a text tells first, and the law, if it tells one."""
+    found = NAME.search(text)
+    return " ".join(filter(None, found.groups())) if found else ""
 
 
 @cache
@@ -69,9 +80,11 @@ def keys_table(table: type[schema.Table]) -> str:
     """Keys of a table with type, unit, default and meaning, as Markdown."""
     told = table.model_json_schema()
     required = told.get("required", ())
+    own = [table, *(base for base in table.__mro__[1:] if not name_of(base.__doc__ or ""))]
     return HEAD + "".join(
         row(name, told["properties"][name], name in required, meaning)
-        for name, meaning in meanings()[table.__name__].items()
+        for each in reversed(own)
+        for name, meaning in meanings().get(each.__name__, {}).items()
     )
 
 
@@ -139,8 +152,7 @@ def with_tables(page: str) -> str:
 
     def made(found: re.Match[str]) -> str:
         heading = re.findall(r"^#+ .*$", page[: found.start()], flags=re.M)[-1]
-        named = NAME.search(heading)
-        return keys_table(known[named[1] if named else ""])
+        return keys_table(known[name_of(heading)])
 
     return TABLE.sub(made, page)
 

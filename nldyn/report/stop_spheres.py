@@ -47,7 +47,7 @@ def stop_sphere(scene: Scene, index: int) -> StopSphere | None:
     way = tuple(stop.direction * along for along in AXES[direction])
     if part.mesh is None or part.mesh.model == "frame":
         way = way[:2]
-    return StopSphere(point, stop.radius, way, stop.gap, against)
+    return StopSphere(point, getattr(stop, "radius", None), way, stop.gap, against)
 
 
 def stops_to_draw(scene: Scene) -> list[StopSphere]:

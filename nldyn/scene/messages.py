@@ -157,8 +157,7 @@ def _walked(model: type[BaseModel], key: KeyPath) -> tuple[KeyPath, Any]:
     here: Any = model
     steps: list[str | int] = []
     for step in key:
-        while get_origin(here) is Annotated:
-            here = get_args(here)[0]
+        here = _bare(here)
         tagged = _tagged(here, step)
         if tagged is not None:  # a step into one of several types
             here = tagged
@@ -199,7 +198,7 @@ def _fault(model: type[BaseModel], detail: ErrorDetails) -> str:
     if kind == "dict_type" and isinstance(given, list):
         return f"must be written with a name: [{format_key(detail['loc'])}.NAME]"
     if kind == "model_type":
-        return f"must be a table: [{format_key(detail['loc'])}]"
+        return f"must be a table: [{format_key(_own_steps(model, detail['loc']))}]"
     wanted = f"must be {_wanted(kind, context)}, not {show(given)}"
     return f"{wanted}: {ORDERS}" if detail["loc"][-1] == "harmonic" else wanted
 
@@ -249,6 +248,9 @@ def _unknown_key(model: type[BaseModel], key: KeyPath) -> str:
     if key[0] == "excitation" and name.startswith("frequency"):
         return f"is not a known key: {ORDERS}"
     known = list(here.model_fields) if here else []
+    laws = _bare(_walked(model, key[:-2])[1])
+    if _tagged(laws, key[-2]) and any(name in table.model_fields for table in _tables_in(laws)):
+        return f"is not a key of law '{key[-2]}'"
     guess = nearest(name, known)
     if guess:
         return f"is not a known key; did you mean '{guess}'?"
@@ -267,9 +269,9 @@ def _word(name: str) -> str | None:
 
 
 def table_at(model: type[BaseModel], key: KeyPath) -> type[BaseModel] | None:
-    """Find the table that a key path leads to."""
-    here = _walked(model, key)[1]
-    return here if isinstance(here, type) and issubclass(here, BaseModel) else None
+    """Find the table that a key path leads to, of several the first."""
+    here = _bare(_walked(model, key)[1])
+    return None if get_origin(here) in (list, dict) else next(_tables_in(here), None)
 
 
 def all_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
@@ -280,13 +282,25 @@ def all_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     for name, field in model.model_fields.items():
         path = f"{prefix}{name}"
         yield path
-        inner = _without_none(field.annotation)
-        if get_origin(inner) is dict:
+        if get_origin(_without_none(field.annotation)) is dict:
             path += ".NAME"
-        if get_origin(inner) in (list, dict):
-            inner = get_args(inner)[-1]
-        if isinstance(inner, type) and issubclass(inner, BaseModel):
-            yield from all_keys(inner, path + ".")
+        for table in _tables_in(field.annotation):
+            yield from all_keys(table, path + ".")
+
+
+def _tables_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """The tables that a type is, holds or allows."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _tables_in(inner)
+
+
+def _bare(annotation: Any) -> Any:
+    """A type without what is annotated."""
+    while get_origin(annotation) is Annotated:
+        annotation = get_args(annotation)[0]
+    return annotation
 
 
 def _without_none(annotation: Any) -> Any:

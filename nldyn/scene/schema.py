@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
     AfterValidator,
@@ -576,43 +576,16 @@ class DamperTable(Table):
 
 
 class StopTable(Table):
-    """``[[stops]]``: an elastic or rigid stop that an interface hits."""
+    """``[[stops]]``: a stop that an interface hits."""
 
     at: str
     """Interface that hits the stop."""
     law: Literal["hertz", "linear", "rigid"] = "hertz"
     """`"hertz"`, `"linear"` for a one-sided spring, or `"rigid"` for
     [impacts](../how-to/rigid_stops.md) that take no time."""
-    stiffness: Positive | None = None
-    """[N/m^exponent] Stiffness, above 0. Needed unless `radius` is given."""
-    exponent: Annotated[float, Field(ge=1, le=LARGEST_EXPONENT)] | None = None
-    """Exponent of the law `"hertz"`, from 1 to 4; 1.5 unless given."""
-    radius: Positive | None = None
-    """[m] Radius of a sphere against a plane of the same material, instead of `stiffness`."""
-    youngs_modulus: Positive | None = None
-    """[N/m²] Young's modulus that goes with `radius`."""
-    poissons_ratio: Annotated[float, Field(gt=-1, le=0.5)] | None = None
-    """Poisson's ratio that goes with `radius`; 0.3 unless given."""
     gap: Number = 0.0
     """[m] Clearance at rest. A negative gap is a preload: the stop presses on the structure at
     rest; a rigid one has none."""
-    dissipation: NotNegative | None = None
-    """[s/m] Loss of the contact (Hunt and Crossley): it grows with the penetration, 0 or more;
-    none unless given."""
-    dashpot: NotNegative = 0.0
-    """[N s/m] Dashpot parallel to the spring (Kelvin and Voigt): the force jumps at the
-    contact, and pulls at its end."""
-    pulls: bool = True
-    """`false`: the force of a linear stop with a dashpot is never negative; it lets go where it
-    would pull."""
-    restitution: Annotated[float, Field(ge=0, le=1)] | None = None
-    """Coefficient of restitution from 0 to 1: of a rigid stop, which needs it; of an elastic
-    one instead of `dissipation`, above 0, that of a free body that hits the stop."""
-    impact_speed: Positive | None = None
-    """[m/s] Speed at which `restitution` holds; slower impacts lose less."""
-    mass: Positive | None = None
-    """[kg] Mass of a free body whose `restitution` a linear stop has at every speed; its dashpot
-    follows from that. Instead of `impact_speed`."""
     direction: Literal[1, -1] = 1
     """`1` if positive displacements close the gap, `-1` if negative ones do."""
     against: str | None = None
@@ -627,31 +600,73 @@ class StopTable(Table):
         return value
 
     @model_validator(mode="after")
-    def _complete(self) -> StopTable:
+    def _two_ends(self) -> StopTable:
         _refuse_own(self)
-        if self.law == "rigid":
-            return self._complete_rigid()
+        return self
+
+
+class RigidStopTable(StopTable):
+    """``[[stops]]`` with ``law = "rigid"``."""
+
+    restitution: Annotated[float, Field(ge=0, le=1)]
+    """Coefficient of restitution from 0 to 1."""
+
+    @model_validator(mode="after")
+    def _no_preload(self) -> RigidStopTable:
+        if self.gap < 0.0:
+            raise ValueError("needs a 'gap' of at least 0: a preload needs a stop with a stiffness")
+        return self
+
+
+class ElasticStopTable(StopTable):
+    """What stops have that give way."""
+
+    _beside: ClassVar[tuple[str, ...]] = ("impact_speed",)  # `restitution`
+    dashpot: NotNegative = 0.0
+    """[N s/m] Dashpot parallel to the spring (Kelvin and Voigt): the force jumps at the
+    contact, and pulls at its end."""
+    dissipation: NotNegative | None = None
+    """[s/m] Loss of the contact (Hunt and Crossley): it grows with the penetration, 0 or more;
+    none unless given."""
+    restitution: Annotated[float, Field(ge=0, le=1)] | None = None
+    """Coefficient of restitution, above 0, of a free body that hits the stop, instead of
+    `dissipation`."""
+    impact_speed: Positive | None = None
+    """[m/s] Speed at which `restitution` holds; slower impacts lose less."""
+
+    @model_validator(mode="after")
+    def _one_loss(self) -> ElasticStopTable:
         if self.restitution == 0.0:
             raise ValueError("needs a 'restitution' above 0, or the law 'rigid'")
-        if self.mass is not None:
-            return self._complete_viscous()
-        if (self.restitution is None) != (self.impact_speed is None):
-            other = "'impact_speed' or 'mass'" if self.law == "linear" else "'impact_speed'"
+        given = [key for key in self._beside if getattr(self, key) is not None]
+        if (self.restitution is not None) != bool(given):
+            other = " or ".join(f"'{key}'" for key in self._beside)
             raise ValueError(f"needs both 'restitution' and {other}, or neither")
+        if len(given) > 1:
+            raise ValueError("has both 'impact_speed' and 'mass'; keep one")
         if self.restitution is not None:
             _refuse(self, ("dissipation",), "a stop whose 'restitution' is given")
-        if not self.pulls and (self.law != "linear" or not self.dashpot):
-            raise ValueError(
-                "has 'pulls = false', which needs law 'linear' and a 'dashpot' above 0"
-            )
-        if not self.pulls and (self.dissipation or self.restitution is not None):
-            raise ValueError("has 'pulls = false' beside 'dissipation' or 'restitution'; keep one")
-        sphere = ("radius", "youngs_modulus", "poissons_ratio")
-        if self.law == "linear":
-            _refuse(self, (*sphere, "exponent"), "a linear stop")
-            if self.stiffness is None:
-                raise ValueError("needs 'stiffness' (N/m)")
-        elif self.stiffness is not None:
+        return self
+
+
+class HertzStopTable(ElasticStopTable):
+    """``[[stops]]`` with ``law = "hertz"``."""
+
+    stiffness: Positive | None = None
+    """[N/m^exponent] Stiffness, above 0. Needed unless `radius` is given."""
+    exponent: Annotated[float, Field(ge=1, le=LARGEST_EXPONENT)] | None = None
+    """Exponent, from 1 to 4; 1.5 unless given."""
+    radius: Positive | None = None
+    """[m] Radius of a sphere against a plane of the same material, instead of `stiffness`."""
+    youngs_modulus: Positive | None = None
+    """[N/m²] Young's modulus that goes with `radius`."""
+    poissons_ratio: Annotated[float, Field(gt=-1, le=0.5)] | None = None
+    """Poisson's ratio that goes with `radius`; 0.3 unless given."""
+
+    @model_validator(mode="after")
+    def _one_stiffness(self) -> HertzStopTable:
+        if self.stiffness is not None:
+            sphere = ("radius", "youngs_modulus", "poissons_ratio")
             _refuse(self, sphere, "a stop whose 'stiffness' is given")
         elif self.radius is None or self.youngs_modulus is None:
             raise ValueError(
@@ -661,28 +676,46 @@ class StopTable(Table):
             _refuse(self, ("exponent",), "a stop given by its radius (it is 1.5)")
         return self
 
-    def _complete_viscous(self) -> StopTable:
-        if self.law != "linear" or self.restitution is None:
-            raise ValueError("has 'mass', which goes with the 'restitution' of a linear stop")
-        own = "a linear stop whose 'restitution' goes with a 'mass'"
-        others = ("radius", "youngs_modulus", "poissons_ratio", "exponent", "dissipation")
-        _refuse(self, (*others, "impact_speed"), own)
-        if self.dashpot:
-            raise ValueError(f"has 'dashpot', which is not a key of {own}")
-        if self.stiffness is None:
-            raise ValueError("needs 'stiffness' (N/m)")
+
+class LinearStopTable(ElasticStopTable):
+    """``[[stops]]`` with ``law = "linear"``."""
+
+    _beside = ("impact_speed", "mass")
+    stiffness: Positive
+    """[N/m] Stiffness, above 0."""
+    pulls: bool = True
+    """`false`: the force of a stop with a dashpot is never negative; it lets go where it would
+    pull."""
+    mass: Positive | None = None
+    """[kg] Mass of a free body whose `restitution` the stop has at every speed; its dashpot
+    follows from that. Instead of `impact_speed`."""
+
+    @model_validator(mode="after")
+    def _one_dashpot(self) -> LinearStopTable:
+        if self.mass is not None and self.dashpot:
+            raise ValueError("has both 'mass' and 'dashpot'; keep one")
+        if not self.pulls and self.mass is None:
+            if not self.dashpot:
+                raise ValueError("has 'pulls = false', which needs a 'dashpot' above 0")
+            if self.dissipation or self.restitution is not None:
+                raise ValueError(
+                    "has 'pulls = false' beside 'dissipation' or 'restitution'; keep one"
+                )
         return self
 
-    def _complete_rigid(self) -> StopTable:
-        elastic = ("stiffness", "exponent", "radius", "youngs_modulus", "poissons_ratio", "mass")
-        _refuse(self, (*elastic, "dissipation", "impact_speed"), "a rigid stop")
-        if self.dashpot:
-            raise ValueError("has 'dashpot', which is not a key of a rigid stop")
-        if self.restitution is None:
-            raise ValueError("needs 'restitution' (from 0 to 1)")
-        if self.gap < 0.0:
-            raise ValueError("needs a 'gap' of at least 0: a preload needs a stop with a stiffness")
-        return self
+
+def _law_of(given: Any) -> str:
+    """The law of a stop; of what has none that there is, the first one."""
+    law = given.get("law") if isinstance(given, dict) else getattr(given, "law", None)
+    return law if law in ("linear", "rigid") else "hertz"
+
+
+AnyStopTable = Annotated[
+    Annotated[HertzStopTable, Tag("hertz")]
+    | Annotated[LinearStopTable, Tag("linear")]
+    | Annotated[RigidStopTable, Tag("rigid")],
+    Discriminator(_law_of),
+]
 
 
 # what each kind of excitation needs, and what it may have
@@ -997,7 +1030,7 @@ class Scene(StructureTables):
     joints: list[JointTable] = []
     damping: DampingTable = DampingTable()
     dampers: list[DamperTable] = []
-    stops: list[StopTable] = []
+    stops: list[AnyStopTable] = []
     excitation: list[ExcitationTable] = []
     observe: ObserveTable | None = None
     start: StartTable | None = None

@@ -9,7 +9,17 @@ import numpy as np
 from nldyn.base.errors import SystemModelError
 from nldyn.scene.faults import check_regular, told_as, unreadable
 from nldyn.scene.messages import scene_error
-from nldyn.scene.schema import DamperTable, ExcitationTable, Scene, SpringTable, StopTable
+from nldyn.scene.schema import (
+    DamperTable,
+    ElasticStopTable,
+    ExcitationTable,
+    HertzStopTable,
+    LinearStopTable,
+    RigidStopTable,
+    Scene,
+    SpringTable,
+    StopTable,
+)
 from nldyn.system.loads import BaseMotion, ConstantForce, Excitation, HarmonicForce, Unbalance
 from nldyn.system.measured import MeasuredForce, measured_force
 from nldyn.system.rigid_stop import AnyStop, RigidStop
@@ -50,32 +60,35 @@ def _spring(table: SpringTable) -> AnySpring:
 
 
 def _stop(table: StopTable) -> AnyStop:
-    if table.law == "rigid":
-        assert table.restitution is not None
+    if isinstance(table, RigidStopTable):
         return RigidStop(table.at, table.restitution, table.gap, table.direction, table.against)
+    if isinstance(table, LinearStopTable):
+        return _linear_stop(table)
+    assert isinstance(table, HertzStopTable)
     stiffness = table.stiffness
     if stiffness is None:
         assert table.radius is not None and table.youngs_modulus is not None
         ratio = 0.3 if table.poissons_ratio is None else table.poissons_ratio
         stiffness = hertz_stiffness(table.radius, table.youngs_modulus, ratio)
-    exponent = 1.0 if table.law == "linear" else table.exponent or 1.5
-    loss = table.dissipation or 0.0
-    if table.restitution is not None and table.impact_speed is not None:
-        loss = dissipation_for(table.restitution, table.impact_speed)
+    exponent, loss = table.exponent or 1.5, _dissipation(table)
+    place = table.gap, table.direction, table.against
+    return Stop(table.at, stiffness, exponent, *place, loss, dashpot=table.dashpot)
+
+
+def _linear_stop(table: LinearStopTable) -> Stop:
     dashpot = table.dashpot
     if table.restitution is not None and table.mass is not None:
-        dashpot = dashpot_for(table.restitution, stiffness, table.mass, pulls=table.pulls)
-    return Stop(
-        table.at,
-        stiffness,
-        exponent,
-        table.gap,
-        table.direction,
-        table.against,
-        loss,
-        dashpot=dashpot,
-        pulls=table.pulls or not dashpot,
-    )
+        dashpot = dashpot_for(table.restitution, table.stiffness, table.mass, pulls=table.pulls)
+    return Stop.linear(
+        table.at, table.stiffness, gap=table.gap, direction=table.direction, against=table.against,
+        dissipation=_dissipation(table), dashpot=dashpot, pulls=table.pulls or not dashpot,
+    )  # fmt: skip
+
+
+def _dissipation(table: ElasticStopTable) -> float:
+    if table.restitution is not None and table.impact_speed is not None:
+        return dissipation_for(table.restitution, table.impact_speed)
+    return table.dissipation or 0.0
 
 
 def _excitation(scene: Scene, number: int, table: ExcitationTable) -> tuple[Excitation, ...]:

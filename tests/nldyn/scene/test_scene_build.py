@@ -227,9 +227,9 @@ def test_a_rigid_stop_has_a_restitution_and_nothing_elastic():
     (built,) = build_system(parse_scene(MODAL + stop + "restitution=0.8\ngap=1e-3\n")).stops
     assert built == RigidStop("a", 0.8, 1e-3)
     for wrong, words in (
-        ("", "needs 'restitution'"),
-        ("restitution=0.8\nstiffness=1e9\n", "'stiffness', which is not a key of a rigid stop"),
-        ("restitution=0.8\ndashpot=1.0\n", "'dashpot', which is not a key of a rigid stop"),
+        ("", "restitution is missing"),
+        ("restitution=0.8\nstiffness=1e9\n", "stiffness is not a key of law 'rigid'"),
+        ("restitution=0.8\ndashpot=1.0\n", "dashpot is not a key of law 'rigid'"),
         ("restitution=0.8\ngap=-1e-3\n", "a preload needs a stop with a stiffness"),
     ):
         with pytest.raises(SceneError, match=words):

@@ -10,7 +10,7 @@ import pytest
 from nldyn.base.resources import example, examples
 from nldyn.scene.messages import all_keys, table_at
 from nldyn.scene.read import load_scene, parse_scene
-from nldyn.scene.schema import PlaceOfMatrices, Scene
+from nldyn.scene.schema import PlaceOfMatrices, Scene, StopTable
 
 DOCS = Path(__file__).parents[3] / "docs"
 DOC = (DOCS / "reference" / "scene.md").read_text(encoding="utf-8")
@@ -23,8 +23,8 @@ def documented():
     table, rows = "", {}
     for line in DOC.splitlines():
         if line.startswith("#"):
-            heading = re.search(r"`\[+([\w.]+)\]+`", line)
-            table = heading.group(1) + "." if heading else ""
+            heading = re.search(r"`\[+([\w.]+)\]+`(?: with `law = \"(\w+)\"`)?", line)
+            table = " ".join(filter(None, heading.groups())) + "." if heading else ""
         row = re.fullmatch(r"\| `(\w+)` \|.*?\|.*?\|(.*?)\|(.*)\|", line)
         if row:
             rows[table + row.group(1)] = (row.group(2).strip(), row.group(3).strip())
@@ -34,18 +34,31 @@ def documented():
 def schema_keys():
     """Give the keys that hold a value, without those that hold tables, each once.
 
-    A component has the tables of a scene's structure.
+    A component has the tables of a scene's structure; a stop has the keys of its law, too.
     """
-    keys = [key for key in all_keys(Scene) if not key.startswith("components.NAME.")]
-    return [
+    elsewhere = ("components.NAME.", "stops.", "matrices.interfaces.", "matrices.loads.")
+    keys = [key for key in all_keys(Scene) if not key.startswith(elsewhere)]
+    plain = [
         key
         for key in keys
-        if key != "components" and not any(other.startswith(key + ".") for other in keys)
+        if key not in ("components", "stops")
+        and not any(other.startswith(key + ".") for other in keys)
     ]
+    common = [f"stops.{name}" for name in StopTable.model_fields]
+    of_laws = [
+        f"stops {law}.{name}"
+        for law in ("hertz", "linear", "rigid")
+        for name in table_at(Scene, ("stops", 0, law)).model_fields
+        if name not in StopTable.model_fields
+    ]
+    return [*plain, *common, *of_laws]
 
 
 def field(key):
     *tables, name = key.split(".")
+    if tables[:1] and tables[0].startswith("stops"):
+        law = tables[0].partition(" ")[2] or "hertz"
+        return table_at(Scene, ("stops", 0, law)).model_fields[name]
     path = [0 if step == "NAME" else step for step in tables]
     if tables and tables[0] in Scene.model_fields and len(tables) == 1:
         annotation = str(Scene.model_fields[tables[0]].annotation)
