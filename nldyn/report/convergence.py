@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from nldyn.plot.diagram import MARKERS, PERIOD_COLOURS, file_axes, save_figure
 from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy
 from nldyn.reduction.model_errors import counted_modes
-from nldyn.report.convergence_page import write_study_page
+from nldyn.report.convergence_page import study_content
 from nldyn.report.convergence_tables import study_tables
+from nldyn.report.offline import write_html
 from nldyn.report.results import write_table
 from nldyn.runtime.result_directory import result_directory
 
@@ -39,7 +40,8 @@ def write_study(
         tables = study_tables(study)
         write_table(folder / "convergence.csv", *tables["models"])
         write_table(folder / "special_points_by_model.csv", *tables["folds and flips"])
-        write_study_page(study, folder / "convergence.html", tables, title, text)
+        content = study_content(study, tables, title, text)
+        write_html(folder / "convergence.html", "convergence.html", content)
         if text:
             (folder / "scene.toml").write_text(text, encoding="utf-8")
         (folder / "report.txt").write_text(study.report() + "\n", encoding="utf-8")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from nldyn.orbits.orbit import Orbit
@@ -18,40 +17,27 @@ from nldyn.reduction.model_errors import (
     counted_modes,
     largest_force,
 )
-from nldyn.report.offline import Table, as_table, versions, write_html
+from nldyn.report.offline import Table, as_table, versions
 from nldyn.report.orbit_content import known
 
 TOLERANCE = 0.01  # of the advice and of the light band
 TIMES = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"))
 
 
-def write_study_page(
-    study: ConvergenceStudy,
-    path: Path,
-    tables: Mapping[str, Table],
-    title: str = "",
-    text: str = "",
-) -> None:
-    """Write one HTML file that shows a convergence study in a browser, without a network.
+def study_content(
+    study: ConvergenceStudy, tables: Mapping[str, Table], title: str, text: str
+) -> dict[str, Any]:
+    """What the page of a convergence study shows, ready for JSON.
 
     Parameters
     ----------
     study : ConvergenceStudy
         What to show.
-    path : Path
-        The file.
     tables : dict of str to (columns, rows)
         What `study_tables` gives.
     title, text : str
         Title and text of the scene.
     """
-    write_html(path, "convergence.html", study_content(study, tables, title, text))
-
-
-def study_content(
-    study: ConvergenceStudy, tables: Mapping[str, Table], title: str, text: str
-) -> dict[str, Any]:
-    """What the page shows, ready for JSON; the parameters are those of `write_study_page`."""
     low, high = study.setting.range_hz
     return {
         "title": title or "Convergence study",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from functools import partial
 from multiprocessing.queues import SimpleQueue
 from typing import TypeVar
 
+from nldyn.runtime.executors import quiet_process
 from nldyn.runtime.progress import Progress, Shares, progress_line
 
 Value = TypeVar("Value")
@@ -113,14 +113,7 @@ def _prepare(messages: SimpleQueue[Message]) -> None:
     """Let a worker process tell what it computes, and end when its parent ends."""
     global _messages
     _messages = messages
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
+    quiet_process()
 
 
 @contextmanager
