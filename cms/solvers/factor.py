@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -165,6 +166,11 @@ def chosen_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
         if wanted == "pardiso" and not pardiso_is_there():
             raise ReductionError("CMS_SOLVER=pardiso needs the package pypardiso with its library")
         return SOLVERS[wanted](matrix)
+    if not pardiso_is_there() and find_spec("pypardiso") is not None:
+        announce(
+            "pypardiso is installed, but MKL's library mkl_rt is not found (PYPARDISO_MKL_RT may "
+            "name it): taking another solver"
+        )
     for name in ("pardiso", "cholesky") if pardiso_is_there() else ("cholesky",):
         try:
             return SOLVERS[name](matrix)
@@ -332,6 +338,8 @@ def pardiso_solver(matrix: SparseMatrix) -> tuple[Solver, bool] | None:
     pardiso.set_phase(33)
 
     def solver(right: FloatArray) -> FloatArray:
+        if not right.size:  # which PARDISO takes for an error
+            return np.zeros_like(right)
         found = pardiso._call_pardiso(upper, np.asfortranarray(right, dtype=np.float64))
         return np.asarray(found, dtype=np.float64)
 

@@ -368,6 +368,7 @@ class FakePardiso:
             except RuntimeError:  # exactly singular
                 raise FakePardisoError from None
         if self.phase == 33:
+            assert right.size  # else the real one fails
             return self.inverse.solve(np.ascontiguousarray(right)) * (1.0 + self.spoil)
         return right
 
@@ -396,6 +397,9 @@ def test_pardiso_is_chosen_where_it_is_installed(pardiso):
     np.testing.assert_allclose(reduced.frequencies_hz[:3], fixed_free_hz(2500)[:3], rtol=1e-8)
     floating = cms.reduce(chain(2500, left=0.0), modes=3)
     assert floating.rigid_body_modes == 1
+    without_loads = cms.Matrices(chain(2500).stiffness, chain(2500).mass, {})
+    alone = cms.reduce(without_loads, modes=3)
+    np.testing.assert_allclose(alone.frequencies_hz, fixed_free_hz(2500)[:3], rtol=1e-8)
 
 
 @pytest.mark.parametrize("spoil", [1e-3, np.nan])
@@ -462,6 +466,16 @@ def test_a_solver_that_is_not_there_is_told(monkeypatch, name, sentence):
     monkeypatch.setattr("cms.solvers.factor.pardiso_is_there", lambda: False)
     with pytest.raises(cms.ReductionError, match=sentence):
         cms.reduce(chain(2500), modes=3)
+
+
+def test_pardiso_without_its_library_is_told(monkeypatch):
+    monkeypatch.delenv("CMS_SOLVER", raising=False)
+    monkeypatch.setattr("cms.solvers.factor.pardiso_is_there", lambda: False)
+    monkeypatch.setattr("cms.solvers.factor.find_spec", lambda name: name)
+    told = []
+    cms.reduce(chain(2500), modes=3, progress=told.append)
+    assert told[0].startswith("pypardiso is installed, but MKL's library mkl_rt is not found")
+    assert any("by sparse Cholesky" in text for text in told)
 
 
 def test_fewer_modes_of_a_model_are_the_model_of_fewer_modes(cantilever):
