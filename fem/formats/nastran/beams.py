@@ -60,8 +60,8 @@ def _fill(card: Card, defaults: list[Card]) -> None:
     """Blank fields of a beam from BAROR or BEAMOR."""
     card.fields += [""] * (16 - len(card.fields))
     for other in defaults:
-        if not card.text(1):
-            card.fields[1] = other.text(1)
+        for at in (1, 7):
+            card.fields[at] = card.fields[at] or other.text(at)
         if not any(card.text(at) for at in (4, 5, 6)):
             card.fields[4:7] = [other.text(at) for at in (4, 5, 6)]
 
@@ -90,6 +90,8 @@ def _read_line(gathered: Gathered, card: Card, lines: _Lines) -> None:
         for at in (8, 9)
     )
     lines.pins.append(pins)
+    if any(card.text(at) for at in (16, 17)):
+        deck.leave_out("warping at the ends of CBEAM", card.place, "beams warp freely")
 
 
 def _height(gathered: Gathered, card: Card, span: FloatArray, system: str) -> FloatArray:

@@ -18,6 +18,9 @@ WHOLE = re.compile(r"[+-]?\d+")
 MOST_INCLUDED = 200  # files, each counted as often as it is included
 EQUATION = "DEQATN"
 """A card whose fields are text."""
+INCLUDE = re.compile(r"\s*INCLUDE\b\s*(.*)", re.IGNORECASE)
+CASES = re.compile(r"\s*CEND\b", re.IGNORECASE)
+"""The line after which executive control ends."""
 MARK = re.compile(r"[+*]\S+")
 Given = TypeVar("Given")
 
@@ -126,7 +129,7 @@ class Card:
 
     def components(self, at: int) -> list[int]:
         """Directions out of 1 to 6, such as "1346"."""
-        word = self.text(at)
+        word = self.text(at).replace(" ", "")
         if not re.fullmatch(r"[1-6]+", word):
             raise self.fail(f"{word!r} in field {at + 2} are not directions out of 1 to 6")
         return [int(digit) for digit in dict.fromkeys(word)]
@@ -134,6 +137,9 @@ class Card:
 
 def lines_of(path: Path, folders: Sequence[Path]) -> Iterator[Line]:
     """The lines of a file without comments and blank ones, with those of included files.
+
+    Files that executive control includes, before ``CEND``, hold no bulk data and are not opened:
+    their lines stay.
 
     Parameters
     ----------
@@ -152,13 +158,15 @@ def lines_of(path: Path, folders: Sequence[Path]) -> Iterator[Line]:
 
 
 def _lines(path: Path, source: Path, folders: Sequence[Path], count: list[int]) -> Iterator[Line]:
-    raw = iter(enumerate(decoded(path.read_bytes()).splitlines(), start=1))
+    texts = decoded(path.read_bytes()).splitlines()
+    executive = next((i for i, text in enumerate(texts) if CASES.match(text)), 0)
+    raw = iter(enumerate(texts, start=1))
     for number, text in raw:
         words = text.partition("$")[0].rstrip()
         if not words.strip():
             continue
-        found = re.match(r"\s*INCLUDE\b\s*(.*)", words, re.IGNORECASE)
-        if found is None:
+        found = INCLUDE.match(words)
+        if found is None or number <= executive:
             yield Line(words, path, number)
             continue
         name = found[1].strip()
@@ -227,7 +235,7 @@ def cards_of(lines: Sequence[Line], source: Path) -> Iterator[Card]:
             continue
         if card is not None:
             yield card
-        card = Card(first.upper().rstrip("*"), fields, line, source, mark)
+        card = Card(first.upper().rstrip("*").rstrip(), fields, line, source, mark)
     if card is not None:
         yield card
 

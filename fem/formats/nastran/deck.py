@@ -10,14 +10,15 @@ import numpy as np
 
 from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError
-from fem.formats.nastran.cards import Card, cards_of, lines_of
+from fem.formats.nastran.cards import INCLUDE, Card, cards_of, lines_of
 from fem.formats.nastran.control import Control, divided
-from fem.formats.nastran.known import ADVICE, LEFT_OUT, READ, UNKNOWN
+from fem.formats.nastran.known import LEFT_OUT, READ, advice
 from fem.formats.nastran.systems import CARDS as SYSTEM_CARDS
 from fem.formats.nastran.systems import Systems
 from fem.mesh.attachments import LeftOut
 
 DIRECTIONS = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
+NO_BULK_DATA = "it holds no bulk data, which comes after CEND"
 SUPERELEMENTS = "superelements are not read; write the model as one"
 
 
@@ -91,6 +92,12 @@ class Deck:
         """Keep what is left out by intention."""
         self.left.setdefault(what, Told(0, place, reason)).count += count
 
+    def tell_of_damping(self, card: Card, at: int) -> None:
+        """Tell of the coefficient of structural damping (GE) in a field of a card, once for all."""
+        what = f"GE of {card.name}"
+        if card.real(at) and what not in self.left:
+            self.leave_out(what, card.place, "damping of materials is given by the scene")
+
     def refuse(self, what: str, place: str, reason: str) -> None:
         """Keep what is refused, to be told together with all else."""
         self.refused.setdefault(what, Told(0, place, reason)).count += 1
@@ -146,6 +153,9 @@ def read_deck(path: Path, folders: Sequence[Path], ignore: Iterable[str]) -> Dec
     """
     deck = Deck(path, frozenset(name.upper().rstrip("*") for name in ignore))
     lines = list(lines_of(path, folders))
+    for line in lines:
+        if INCLUDE.match(line.text):  # those of bulk data have become the lines that they hold
+            deck.leave_out("INCLUDE of executive control", line.place(path), NO_BULK_DATA)
     deck.control, bulk, supers = divided(lines)
     for line in supers:
         raise ModelError(f"{path}: line {line.number}: {line.text.strip()}: {SUPERELEMENTS}")
@@ -158,7 +168,7 @@ def read_deck(path: Path, folders: Sequence[Path], ignore: Iterable[str]) -> Dec
         elif card.name in LEFT_OUT:
             deck.leave_out(card.name, card.place, LEFT_OUT[card.name])
         else:
-            deck.refuse(card.name, card.place, ADVICE.get(card.name, UNKNOWN))
+            deck.refuse(card.name, card.place, advice(card.name))
     deck.raise_refused()
     _read_systems(deck)
     _read_points(deck)

@@ -22,6 +22,8 @@ from fem.mesh.attachments import (
 )
 
 Term = tuple[str, str, float]
+OWN_NUMBERS = ("R", "CONM", "CMASS")
+"""How the names of rigid elements and masses begin, which decks number by themselves."""
 TINY = 1e-12  # of a unit vector: a component that is rounding
 
 
@@ -57,13 +59,14 @@ class Gathered:
     equations: list[LinearEquation] = field(default_factory=list)
     supports: list[Support] = field(default_factory=list)
     matrices: list[PointMatrix] = field(default_factory=list)
-    elements: dict[tuple[bool, int], Card] = field(default_factory=dict)
+    elements: dict[tuple[str, int], Card] = field(default_factory=dict)
     joined: set[int] = field(default_factory=set)
 
     def add_element(self, card: Card) -> int:
         """The number of an element, which may stand once only among those of its sort."""
         number = card.whole(0)
-        key = (card.name[0] == "R", number)  # rigid elements have numbers of their own
+        sort = next((s for s in OWN_NUMBERS if card.name.startswith(s)), "")
+        key = (sort, number)
         if key in self.elements:
             raise card.fail(f"element {number} is defined twice")
         self.elements[key] = card

@@ -59,7 +59,6 @@ LEFT_OUT = {card: why for why, cards in _LEFT_OUT.items() for card in cards.spli
 CONTACT = "contact is not read; give it as [[stops]] in the scene"
 JOINED = "give the parts joined, node to node, or by RBE2, RBE3 or CBUSH"
 _REFUSED = {
-    "write the cards out": "= =(1)",
     "gyroscopic terms are not read; give them as [spin] in the scene": "ROTORG ROTORSE RGYRO",
     "a laminated beam; give its numbers by PBEAM": "PBCOMP PBMSECT PBRSECT",
     CONTACT: "CGAP PGAP BCTSET BGSET BGADD BCTSETG CSLIFS BCONPR BCONUDS BGPARM",
@@ -89,7 +88,13 @@ _REFUSED = {
 ADVICE = {card: advice for advice, cards in _REFUSED.items() for card in cards.split()}
 """What to do instead of some of the cards that are refused."""
 
+REPEATED = "it repeats the card before it; write the cards out"
 UNKNOWN = "it is neither read nor known to be without effect on stiffness, mass and connection"
 
 PARAMETERS_WITH_EFFECT = frozenset({"WTMASS", "AUTOSPC", "CM1", "CM2", "CK1", "CK2"})
 """Names of ``PARAM`` that matter; WTMASS and AUTOSPC are taken, the others refused unless 1."""
+
+
+def advice(name: str) -> str:
+    """What to do about a card that is refused, or why it is."""
+    return REPEATED if name.startswith("=") else ADVICE.get(name, UNKNOWN)

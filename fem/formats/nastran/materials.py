@@ -147,10 +147,7 @@ class Materials:
         return self.cards[number]
 
     def _tell_of_unused(self, card: Card) -> None:
-        if card.text(DAMPINGS[card.name]) and card.real(DAMPINGS[card.name]):
-            reason = "damping of materials is given by the scene"
-            if "GE of materials" not in self.deck.left:
-                self.deck.leave_out("GE of materials", card.place, reason)
+        self.deck.tell_of_damping(card, DAMPINGS[card.name])
         if any(card.text(at) and card.real(at) for at in EXPANSIONS[card.name]):
             what = f"thermal expansion of {card.name} {card.whole(0)}"
             if what not in self.deck.left:

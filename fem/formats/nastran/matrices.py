@@ -58,19 +58,12 @@ def _all(cards: list[Card]) -> dict[str, _Matrix]:
     for card in cards:
         name = card.text(0)
         if card.text(1) == "0":
-            found[name] = _begun(card)
+            found[name] = _Matrix(card)
         elif name not in found:
             raise card.fail(f"the matrix {name} is not begun (DMIG,{name},0,...)")
         else:
             _column(card, found[name])
     return found
-
-
-def _begun(card: Card) -> _Matrix:
-    form, kind = card.whole(2), card.whole(3)
-    if form not in (SYMMETRIC, SQUARE) or kind not in (1, 2):
-        raise card.fail("must be symmetric (6) or square (1) and real (1 or 2)")
-    return _Matrix(card)
 
 
 def _column(card: Card, matrix: _Matrix) -> None:
@@ -85,9 +78,12 @@ def _column(card: Card, matrix: _Matrix) -> None:
 
 
 def _add(gathered: Gathered, kind: str, name: str, matrix: _Matrix) -> None:
+    card = matrix.card
+    if card.whole(2) not in (SYMMETRIC, SQUARE) or card.whole(3) not in (1, 2):
+        raise card.fail("must be symmetric (6) or square (1) and real (1 or 2)")
     entries = sorted({entry for pair in matrix.values for entry in pair})
     if len(entries) > MOST:
-        raise matrix.card.fail(
+        raise card.fail(
             f"{name} has {len(entries)} rows, more than {MOST}; give it as [matrices] in the scene"
         )
     at = {entry: i for i, entry in enumerate(entries)}
@@ -95,9 +91,9 @@ def _add(gathered: Gathered, kind: str, name: str, matrix: _Matrix) -> None:
     for (row, column), value in matrix.values.items():
         full[at[row], at[column]] = value
     if not np.allclose(full, full.T, rtol=1e-9, atol=1e-9 * np.abs(full).max(initial=0.0)):
-        raise matrix.card.fail(f"{name} is not symmetric")
+        raise card.fail(f"{name} is not symmetric")
     for grid, component in entries:
         if component > 3 and kind != "mass":
             gathered.turns.add(grid)
-    rows = [gathered.terms(matrix.card, grid, max(component, 1)) for grid, component in entries]
-    gathered.add_matrix(matrix.card, rows, **{kind: full})
+    rows = [gathered.terms(card, grid, max(component, 1)) for grid, component in entries]
+    gathered.add_matrix(card, rows, **{kind: full})

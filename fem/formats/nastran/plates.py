@@ -100,6 +100,7 @@ def _likeness(A: FloatArray, D: FloatArray, mass: float, t: float) -> Material:
 def composite(card: Card, materials: Materials) -> Sheet:
     """A PCOMP or PCOMPG: layers from the bottom to the top."""
     layers = _layers(card, materials)
+    materials.deck.tell_of_damping(card, 6)
     lamination = card.text(7)
     if lamination == "SYM":
         layers = [*layers, *layers[::-1]]

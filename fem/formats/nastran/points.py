@@ -8,6 +8,7 @@ import numpy as np
 
 from fem.base.arrays import FloatArray
 from fem.formats.nastran.cards import Card
+from fem.formats.nastran.deck import Deck
 from fem.formats.nastran.gathered import Gathered, Term
 from fem.mesh.attachments import Link, PointMass
 
@@ -62,10 +63,12 @@ def _read_scalar(
         if number not in properties:
             raise card.fail(f"names the property {number}, which is not defined")
         owner, at = properties[number]
-        value, first = owner.real(at), 2
     else:
-        value, first = card.real(1), 2
-    ends = _ends(gathered, card, first, n)
+        owner, at = card, 1
+    value = owner.real(at)
+    if kind == STIFFNESS and n < 4:
+        gathered.deck.tell_of_damping(owner, at + 1 if n in (1, 3) else 6)
+    ends = _ends(gathered, card, 2, n)
     if not ends:
         raise card.fail("is joined to no point")
     if value == 0.0:
@@ -177,7 +180,7 @@ def _read_bush(gathered: Gathered, card: Card) -> None:
     number = card.whole(1, card.whole(0))
     if number not in owners:
         raise card.fail(f"names the property PBUSH {number}, which is not defined")
-    numbers = _bush_numbers(owners[number])
+    numbers = _bush_numbers(gathered.deck, owners[number])
     stiffness, damping = numbers["K"], numbers["B"]
     first, second = card.whole(2), card.whole(3, 0)
     ends = [first] + ([second] if second else [])
@@ -204,7 +207,7 @@ def _read_bush(gathered: Gathered, card: Card) -> None:
     gathered.add_matrix(card, rows, stiffness=K, damping=C)
 
 
-def _bush_numbers(card: Card) -> dict[str, FloatArray]:
+def _bush_numbers(deck: Deck, card: Card) -> dict[str, FloatArray]:
     """Six stiffnesses K and dampings B of PBUSH, whose words stand before six numbers each."""
     found = {"K": np.zeros(6), "B": np.zeros(6)}
     at = 1
@@ -215,7 +218,9 @@ def _bush_numbers(card: Card) -> dict[str, FloatArray]:
             at += 7
         elif word == "M" and any(card.text(at + 1 + i) for i in range(6)):
             raise card.fail("its mass (M) is not read; give it as CONM2")
-        elif word in ("GE", "RCV", "M", "T", "D"):  # damping by K, recovery of stresses
+        elif word in ("GE", "RCV", "M", "T", "D"):  # RCV: recovery of stresses
+            for i in range(6 if word == "GE" else 0):
+                deck.tell_of_damping(card, at + 1 + i)
             at += 7
         elif not word:
             at += 1

@@ -224,10 +224,13 @@ def _weighted(card: Card) -> list[tuple[float, list[int], list[int]]]:
 def _read_mpc(gathered: Gathered, card: Card) -> None:
     """A linear equation between directions of grid points."""
     terms: list[Term] = []
-    for grid, component, value in _forms(gathered, card):
-        terms += gathered.terms(card, grid, component, value)
-    if not terms:
+    forms = _forms(gathered, card)
+    if not forms:
         raise card.fail("has no terms")
+    if forms[0][2] == 0.0:
+        raise card.fail("its first factor is 0, so that its first direction depends on nothing")
+    for grid, component, value in forms:
+        terms += gathered.terms(card, grid, component, value)
     _equation(gathered, card, terms)
 
 

@@ -154,6 +154,9 @@ def test_included_files_are_read_and_errors_name_them(tmp_path):
     (tmp_path / "points.inc").write_text("GRID,1," + points.replace("CHEXA,1,2", "CHEXA,1,x"))
     with pytest.raises(fem.ModelError, match=r"brick.bdf: points.inc line 9: CHEXA: 'X'"):
         fem.read_structure(path)
+    path.write_text(BRICK.replace("CEND", "INCLUDE '/programs/alter.v9'\nCEND", 1))
+    told = [str(item) for item in fem.read_structure(path).left_out]
+    assert told[0].startswith("INCLUDE of executive control (1, first in line 2): it holds no bulk")
 
 
 @pytest.mark.filterwarnings("ignore::fem.LockingWarning")

@@ -85,11 +85,34 @@ def test_coordinate_systems_stand_in_chains(tmp_path):
         ("SPC1,1,7,1\n", "SPC1: '7' in field 4 are not directions out of 1 to 6|'7' in field 3"),
         ("RBE3,9,,1,123456,1.,123,2,3\n", "RBE3: its grid points do not determine all six"),
         ("RBAR,9,1,2,123,123456\n", "RBAR: its independent directions .* are not six"),
+        ("GRID,9,,0.,0.,0.\n=,*1,=,*1.,==\n=4\n", r"= \(1, .* =4 \(1, .*: it repeats the card"),
     ],
 )  # fmt: skip
 def test_faults_name_card_line_and_what_is_wrong(tmp_path, more, said):
     with pytest.raises(fem.ModelError, match=said):
         read(tmp_path, more)
+
+
+def test_an_equation_needs_a_first_factor(tmp_path):
+    with pytest.raises(fem.ModelError, match="line 17: MPC: its first factor is 0"):
+        read(tmp_path, "MPC,1,1,1,0.,2,1,1.\n", "MPC = 1")
+
+
+def test_structural_damping_and_warping_are_told(tmp_path):
+    cards = (
+        "GRID,9,,2.,0.,0.\nPELAS,3,4.,.1\nCELAS1,11,3,9,1,1,1\nCELAS2,12,4.,9,2,,,.1\n"
+        "PBUSH,4,K,1.,1.,1.,1.,1.,1.\n,GE,.05\nCBUSH,13,4,9,,,,,0\n"
+        "PBEAM,5,1,.1,.1,.1,,.1\nCBEAM,14,5,2,9,0.,0.,1.\n,,,,,,,,\n,77,78\n"
+    )
+    told = {item.keyword for item in read(tmp_path, cards).left_out}
+    assert {"GE of PELAS", "GE of CELAS2", "GE of PBUSH", "warping at the ends of CBEAM"} <= told
+
+
+def test_masses_have_numbers_of_their_own_and_directions_may_have_blanks(tmp_path):
+    text = f"CONM2,1,2,,3.\nSPC1    1       12  3   1\nCONM2  *{2:<16}{3:<16}{0:<16}{5.0:<16}\n*\n"
+    mesh = read(tmp_path, text)
+    assert [mass.mass for mass in mesh.attachments.point_masses] == [3.0, 5.0]
+    assert mesh.attachments.supports[0].directions == ("x", "y", "z")
 
 
 def test_case_control_chooses_supports_and_all_else_is_told(tmp_path):
@@ -267,5 +290,7 @@ def test_matrices_that_case_control_names_are_added(tmp_path):
     bad = "DMIG,MASS,0,1,1\nDMIG,MASS,1,1,,2,1,2.\n"
     with pytest.raises(fem.ModelError, match="DMIG: MASS is not symmetric"):
         read(tmp_path, bad, "M2GG = MASS")
+    rectangular = "DMIG,MASS,0,2,1\n"
     with pytest.raises(fem.ModelError, match="DMIG: must be symmetric"):
-        read(tmp_path, "DMIG,MASS,0,2,1\n", "M2GG = MASS")
+        read(tmp_path, rectangular, "M2GG = MASS")
+    assert [item.keyword for item in read(tmp_path, rectangular, "").left_out] == ["DMIG MASS"]

@@ -119,7 +119,7 @@ def test_what_is_not_used_is_told(tmp_path):
     told = [str(item) for item in read(tmp_path, cards).left_out]
     assert "thermal expansion of MAT1 2" in " ".join(told)
     assert any(text.startswith("TEMPD (1") for text in told)
-    assert any(text.startswith("GE of materials (1") for text in told)
+    assert any(text.startswith("GE of MAT1 (1") for text in told)
 
 
 @pytest.mark.parametrize(
