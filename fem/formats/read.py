@@ -11,14 +11,15 @@ import meshio
 
 import fem.formats.meshio_kinds  # noqa: F401  (completes meshio's tables)
 from fem.base.errors import ModelError, quoted
-from fem.formats.abaqus import AbaqusFile, read_abaqus
+from fem.formats.abaqus import read_abaqus
 from fem.formats.abaqus.deck import bare
+from fem.formats.deck_file import DeckFile
 from fem.formats.faults import reason_of
 from fem.formats.from_meshio import from_meshio, structure_from_meshio
 from fem.formats.gmsh import read_gmsh
 from fem.formats.ignored import without_cells
 from fem.formats.med import read_med
-from fem.formats.nastran import NastranFile, read_nastran
+from fem.formats.nastran import read_nastran
 from fem.formats.unv import read_unv
 from fem.formats.vtk import read_vtk, read_vtu
 from fem.mesh.frame_mesh import FrameMesh
@@ -190,7 +191,7 @@ def _deck_mesh(
 def _with_attached(
     path: Path,
     build: Callable[[meshio.Mesh, str], Mesh],
-    found: AbaqusFile | NastranFile,
+    found: DeckFile,
     ignore: Sequence[str],
 ) -> Mesh:
     """The mesh of a deck, with what the deck attaches to it and says of it."""

@@ -9,7 +9,6 @@ import argparse
 import json
 import os
 import resource
-import signal
 import subprocess
 import sys
 import tempfile
@@ -24,6 +23,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 import cms
 import fem
+from bench.with_gmsh import gmsh_at_work
 from cms.base.arrays import FloatArray
 from cms.component.component import checked_pencil
 from cms.solvers.factor import SOLVERS, pardiso_is_there
@@ -63,11 +63,7 @@ class SolidTime:
 
 def write_bracket(edge: float, path: Path) -> None:
     """Mesh an angle with a hole in its longer arm by edges of a length in m, and write it."""
-    import gmsh
-
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
+    with gmsh_at_work() as gmsh:
         arm = gmsh.model.occ.addBox(0.0, 0.0, 0.0, 0.5, 0.1, 0.06)
         hole = gmsh.model.occ.addCylinder(0.4, 0.05, 0.0, 0.0, 0.0, 0.06, 0.03)
         post = gmsh.model.occ.addBox(0.0, 0.0, 0.06, 0.06, 0.1, 0.2)
@@ -83,10 +79,6 @@ def write_bracket(edge: float, path: Path) -> None:
         gmsh.option.setNumber("Mesh.Binary", 1)
         gmsh.model.mesh.generate(3)
         gmsh.write(str(path))
-    finally:
-        gmsh.finalize()
-        if hasattr(signal, "SIGPIPE"):  # Gmsh makes a broken pipe deadly
-            signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 def assembled(path: Path) -> fem.StructureComponent:

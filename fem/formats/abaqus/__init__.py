@@ -8,11 +8,8 @@ it leaves out by intention (`known.py`), and refuses all else at once.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable
 from pathlib import Path
-
-import meshio
 
 from fem.formats.abaqus.assembly import read_scopes
 from fem.formats.abaqus.attached import Gathered, read_point_elements, read_transforms
@@ -23,42 +20,8 @@ from fem.formats.abaqus.mesh import collected_cells, content_of, numbered_nodes
 from fem.formats.abaqus.sections import described_parts
 from fem.formats.abaqus.sets import Resolver
 from fem.formats.abaqus.surfaces import Surfaces
-from fem.mesh.attachments import Attachments, LeftOut
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class AbaqusFile:
-    """What an input file holds.
-
-    Parameters
-    ----------
-    content
-        Cells, cell sets and point sets. The cells of each element type are a cell set, too, whose
-        name is "abaqus:" and the type.
-    attachments
-        Masses, springs, dashpots, couplings and equations.
-    described
-        Material and section by the name of the element set, as keys of a part of a scene; with
-        the key "refused" and a reason where they cannot be taken.
-    left_out
-        Keywords that are left out by intention.
-    notes
-        Sentences on what means more than it says.
-    ignored
-        What of the names to ignore was met, in capitals and without blanks and asterisk.
-    """
-
-    content: meshio.Mesh
-    attachments: Attachments = field(default_factory=Attachments)
-    described: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
-    left_out: tuple[LeftOut, ...] = ()
-    notes: tuple[str, ...] = ()
-    ignored: frozenset[str] = frozenset()
-
-    def __repr__(self) -> str:
-        cells = ", ".join(f"{len(block.data)} {block.type}" for block in self.content.cells)
-        points = len(self.content.points)
-        return f"<AbaqusFile: {points} points, {cells}; {self.attachments!r}>"
+from fem.formats.deck_file import DeckFile
+from fem.mesh.attachments import LeftOut
 
 
 def _no_cells(deck: Deck) -> str:
@@ -71,7 +34,7 @@ def read_abaqus(
     path: str | Path,
     include_folders: Iterable[str | Path] = (),
     ignore: Iterable[str] = (),
-) -> AbaqusFile:
+) -> DeckFile:
     """Read an input file of Abaqus or CalculiX.
 
     Parameters
@@ -87,7 +50,7 @@ def read_abaqus(
 
     Returns
     -------
-    AbaqusFile
+    DeckFile
         The mesh as meshio has it, and what is attached to it.
 
     Raises
@@ -122,7 +85,7 @@ def read_abaqus(
     read_point_elements(gathered)
     Joints(gathered, surfaces, places).read()
     deck.raise_problems()
-    return AbaqusFile(
+    return DeckFile(
         content_of(deck, cells, gathered, position, places, surfaces),
         gathered.attachments,
         described_parts(deck, resolver),

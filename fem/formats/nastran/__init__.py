@@ -6,13 +6,11 @@ What bears on stiffness, mass and connection is read; what is left out by intent
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable
 from pathlib import Path
 
-import meshio
-
 from fem.base.errors import ModelError
+from fem.formats.deck_file import DeckFile
 from fem.formats.nastran.beams import read_beams
 from fem.formats.nastran.deck import Deck, read_deck
 from fem.formats.nastran.gathered import Gathered
@@ -25,45 +23,11 @@ from fem.formats.nastran.rods import read_rods, twist_rods
 from fem.formats.nastran.shells import read_shells
 from fem.formats.nastran.solids import read_solids
 from fem.formats.nastran.supports import read_supports
-from fem.mesh.attachments import Attachments, LeftOut
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class NastranFile:
-    """What a deck of Nastran holds.
-
-    Parameters
-    ----------
-    content
-        Cells, the cells of each property ("PSHELL 3"), and named points ("node 17").
-    attachments
-        Supports, masses, springs, equations and matrices.
-    described
-        The part of each property under "made"; or under "refused" why there is none.
-    left_out
-        Cards that are left out by intention.
-    notes
-        Sentences on what means more than it says.
-    ignored
-        What of the names to ignore was met, in capitals.
-    """
-
-    content: meshio.Mesh
-    attachments: Attachments = field(default_factory=Attachments)
-    described: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
-    left_out: tuple[LeftOut, ...] = ()
-    notes: tuple[str, ...] = ()
-    ignored: frozenset[str] = frozenset()
-
-    def __repr__(self) -> str:
-        cells = ", ".join(f"{len(block.data)} {block.type}" for block in self.content.cells)
-        points = len(self.content.points)
-        return f"<NastranFile: {points} points, {cells}; {self.attachments!r}>"
 
 
 def read_nastran(
     path: Path, include_folders: Iterable[str | Path] = (), ignore: Iterable[str] = ()
-) -> NastranFile:
+) -> DeckFile:
     """Read bulk data of Nastran.
 
     Parameters
@@ -79,7 +43,7 @@ def read_nastran(
 
     Returns
     -------
-    NastranFile
+    DeckFile
         The mesh as meshio has it, and what is attached to it.
 
     Raises
@@ -126,7 +90,7 @@ def read_nastran(
     read_supports(gathered)
     _name_analysis_set(gathered)
     attached = gathered.attachments()
-    return NastranFile(
+    return DeckFile(
         gathered.content(),
         attached,
         gathered.described,
