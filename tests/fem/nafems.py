@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
+from numpy.polynomial import legendre
+from scipy.linalg import eigh
 from structures import CLAMP, STEEL, lowest_hz
 
 import fem
@@ -18,7 +20,10 @@ import fem
 
 @dataclass(frozen=True)
 class Benchmark:
-    """One benchmark: its model, how many of its lowest frequencies are rigid, what is published."""
+    """One benchmark: its model, how many of its lowest frequencies are rigid, what is published.
+
+    The tolerance is relative to the `reference`.
+    """
 
     name: str
     build: object
@@ -26,6 +31,12 @@ class Benchmark:
     published: tuple[float, ...]
     note: str
     tolerance: float
+    exact: tuple[float, ...] = ()
+
+    @property
+    def reference(self):
+        """What is computed in another way where that is more exact than what is published."""
+        return self.exact or self.published
 
     @cached_property
     def computed(self):
@@ -78,6 +89,34 @@ def deep_beam():
         {"beam": fem.BeamPart(STEEL, fem.RectangularSection(2.0, 2.0), theory="timoshenko")},
         supports=[fem.Support("a", ("x", "y", "z", "rotation_x")), fem.Support("b", ("y", "z"))],
     )
+
+
+def thin_plate_hz(clamped, count):
+    """Frequencies of FV12 or FV16 by Kirchhoff's theory, without the rigid ones.
+
+    By Ritz's method with 18 by 18 Legendre polynomials; those of 16 by 16 agree to 2e-5.
+    """
+    places, weights = legendre.leggauss(24)
+    x, weights = (places + 1.0) / 2.0, weights / 2.0
+    terms = [legendre.Legendre.basis(i, domain=[0.0, 1.0]) for i in range(18)]
+    edge = legendre.Legendre([0.5, 0.5], domain=[0.0, 1.0])  # the coordinate x itself
+    X, Y = (
+        np.array([[(p * factor).deriv(d)(x) for d in range(3)] for p in terms])
+        for factor in (edge**2 if clamped else 1.0, 1.0)
+    )
+
+    def energy(a, b, c, d):
+        """Of the derivatives a and b along x, c and d along y."""
+        return np.kron((X[:, a] * weights) @ X[:, b].T, (Y[:, c] * weights) @ Y[:, d].T)
+
+    E, nu, rho = STEEL.youngs_modulus, STEEL.poissons_ratio, STEEL.density
+    bent = energy(2, 2, 0, 0) + energy(0, 0, 2, 2) + 2.0 * (1.0 - nu) * energy(1, 1, 1, 1)
+    bent += nu * (energy(2, 0, 0, 2) + energy(0, 2, 2, 0))
+    rigid = 0 if clamped else 3
+    last = rigid + count - 1
+    squares = eigh(bent, energy(0, 0, 0, 0), eigvals_only=True, subset_by_index=[rigid, last])
+    speed = 0.05 * np.sqrt(E / (12.0 * rho * (1.0 - nu**2)))
+    return tuple(np.sqrt(squares) * speed / (2.0 * np.pi * 10.0**2))
 
 
 def plate():
@@ -177,7 +216,8 @@ BENCHMARKS = [
     ),
     Benchmark(
         "FV12 free thin square plate", free_plate, 3,
-        (1.622, 2.360, 2.922, 4.233, 4.233, 7.416), "16 x 16 x 1 hexahedron20", 0.013,
+        (1.622, 2.360, 2.922, 4.233, 4.233, 7.416), "16 x 16 x 1 hexahedron20", 0.001,
+        thin_plate_hz(False, 6),
     ),
     Benchmark(
         "FV15 clamped thin rhombic plate", partial(rhombic_plate, 0.05, (32, 32, 1)), 0,
@@ -185,7 +225,8 @@ BENCHMARKS = [
     ),
     Benchmark(
         "FV16 cantilevered thin square plate", cantilevered_plate, 0,
-        (0.421, 1.029, 2.582, 3.306, 3.753, 6.555), "16 x 16 x 1 hexahedron20", 0.009,
+        (0.421, 1.029, 2.582, 3.306, 3.753, 6.555), "16 x 16 x 1 hexahedron20", 0.008,
+        thin_plate_hz(True, 6),
     ),
     Benchmark(
         "FV22 clamped thick rhombic plate", partial(rhombic_plate, 1.0, (16, 16, 2)), 0,
