@@ -30,6 +30,7 @@ from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import Scene
 from nldyn.scene.stops_and_loads import acting_elements
 from nldyn.system.loads import BaseMotion
+from nldyn.system.ride import carried_apart, told_apart
 from nldyn.system.spin import Spin
 from nldyn.system.system import Elements, System
 
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
 Given = TypeVar("Given")
 AnyComponent = fem.Component | fem.StructureComponent | cms.Matrices
 logger = logging.getLogger("nldyn")
-ALIKE_RIDE = 1e-6  # relative difference of two motions with the base that is rounding
 LARGE = 20000  # degrees of freedom from which on the factorisation takes seconds
 
 
@@ -374,30 +374,21 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
 def _check_rides(scene: Scene, system: System) -> None:
     """Refuse stops, springs and dampers of which a moving base carries one end and not the other.
 
-    Displacements are relative to the base, so that their difference is not the distance.
+    Displacements are relative to the base, so that their difference is not the distance. Where
+    only modes are known, these rides are not; whole matrices are checked by `System`.
     """
-    bases = [source for source in system.excitation if isinstance(source, BaseMotion)]
-    if not bases or scene.modal is not None:  # where only the modes are known, these rides are not
+    if scene.modal is not None:
         return
-    for table in ("stops", "springs", "dampers"):
+    bases = [source for source in system.excitation if isinstance(source, BaseMotion)]
+    for table in ("stops", "springs", "dampers") if bases else ():
         for number, element in enumerate(getattr(scene, table)):
             if element.against is None:
                 continue
-            ends = (element.at, element.against)
-            carried = [_carried(scene, system, end) for end in ends]
-            apart: dict[tuple[int, int], complex] = {}
-            for source in bases:
-                factors = [factor.get(source.at, 0.0) for factor in carried]
-                kind = source.harmonic, source.power
-                apart[kind] = apart.get(kind, 0.0) + source.phasor * (factors[0] - factors[1])
-            most = max(abs(source.phasor) for source in bases)
-            if max(map(abs, apart.values())) > ALIKE_RIDE * most:
+            some, other = (_carried(scene, system, end) for end in (element.at, element.against))
+            if carried_apart(bases, some, other):
                 raise scene_error(
-                    scene.file, (table, number),
-                    f"a base carries '{ends[0]}' otherwise than '{ends[1]}', but displacements "
-                    "are relative to the base: move both by it, or give forces in place of it",
-                    sep=": ",
-                )  # fmt: skip
+                    scene.file, (), told_apart(table, number, element.at, element.against), sep=": "
+                )
 
 
 def _carried(scene: Scene, system: System, interface: str) -> dict[str, float]:

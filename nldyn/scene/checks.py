@@ -162,7 +162,22 @@ def remarks(scene: Scene, system: System) -> list[str]:
     """Say what is possible but looks like a mistake in the units, or takes long."""
     beyond = _range_remark(scene, float(system.frequencies_hz.max()))
     slow = _slow_remarks(scene, system)
-    return [*_material_remarks(scene), *([beyond] if beyond else []), *_unused(scene), *slow]
+    odd = *_material_remarks(scene), *([beyond] if beyond else []), *_unknown_rides(scene)
+    return [*odd, *_unused(scene), *slow]
+
+
+def _unknown_rides(scene: Scene) -> Iterator[str]:
+    """Name what ties two places of which nobody knows how a moving base carries them."""
+    if scene.modal is None or not any(table.kind == "base" for table in scene.excitation):
+        return
+    for table in ("stops", "springs", "dampers"):
+        for number, element in enumerate(getattr(scene, table)):
+            if element.against is not None:
+                yield (
+                    f"{table}[{number}]: displacements are relative to the base, and modes do not "
+                    f"tell whether it carries '{element.at}' and '{element.against}' alike, as it "
+                    "must"
+                )
 
 
 def _unused(scene: Scene) -> Iterator[str]:

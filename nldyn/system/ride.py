@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +52,30 @@ class Ride(NamedTuple):
 
     def _turns(self, phases: Real) -> Complex:
         return np.asarray(np.exp(1j * np.asarray(phases)[..., None] * self.orders))
+
+
+ALIKE = 1e-6  # relative difference of two motions with the base that is rounding
+
+
+def carried_apart(
+    bases: Iterable[BaseMotion], some: Mapping[str, float], other: Mapping[str, float]
+) -> bool:
+    """Whether bases carry two places otherwise, by the factors with which each load takes them."""
+    apart: dict[tuple[int, int], complex] = {}
+    most = 0.0
+    for base in bases:
+        kind, off = (base.harmonic, base.power), some.get(base.at, 0.0) - other.get(base.at, 0.0)
+        apart[kind] = apart.get(kind, 0.0) + base.phasor * off
+        most = max(most, abs(base.phasor))
+    return max(map(abs, apart.values()), default=0.0) > ALIKE * most
+
+
+def told_apart(table: str, number: int, at: str, against: str) -> str:
+    """Why a spring, damper or stop between two places that a base carries otherwise is refused."""
+    return (
+        f"{table}[{number}]: a base carries '{at}' otherwise than '{against}', but displacements "
+        "are relative to the base: move both by it, or give forces in place of it"
+    )
 
 
 NO_RIDE = Ride.of((), 0.0)  # of a place at rest

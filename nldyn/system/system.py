@@ -24,7 +24,7 @@ from nldyn.system.linear import (
     without_rounding,
 )
 from nldyn.system.loads import BaseMotion, Excitation, HarmonicForce
-from nldyn.system.ride import NO_RIDE, Ride
+from nldyn.system.ride import NO_RIDE, Ride, carried_apart, told_apart
 from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.spin import Spin, same_spin, skew
 from nldyn.system.springs_dampers import (
@@ -278,14 +278,16 @@ class System:
             }
             for what, vectors in (("interface", interfaces), ("load", loads))
         )
-        return cls(
+        system = cls(
             omega,
             D,
             participation,
             loads=modal_loads,
             circulatory=N,
             **_listed(acting),
-        )._spun(None if spin is None else _of_size(spin, omega.size).on(modes))
+        )
+        system._check_carried()
+        return system._spun(None if spin is None else _of_size(spin, omega.size).on(modes))
 
     @classmethod
     def from_reduced(
@@ -739,6 +741,21 @@ class System:
             object.__setattr__(other, name, elements)
         other._check_interfaces()
         return other
+
+    def _check_carried(self) -> None:
+        """Refuse what ties places that a base carries otherwise; the modes must be complete."""
+        bases = [source for source in self.excitation if isinstance(source, BaseMotion)]
+        loads = {base.at for base in bases}
+        for table in ("stops", "springs", "dampers"):
+            for number, element in enumerate(getattr(self, table)):
+                if element.against is None:
+                    continue
+                some, other = (
+                    {at: float(self.loads[at] @ self.participation[end]) for at in loads}
+                    for end in (element.at, element.against)
+                )
+                if carried_apart(bases, some, other):
+                    raise SystemModelError(told_apart(table, number, element.at, element.against))
 
     def _check_shapes(self) -> None:
         n = self.natural_frequencies.size

@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 
 from nldyn import SceneError, solve_orbit
 from nldyn.scene.build import build_reduced, build_system
-from nldyn.scene.checks import check_computable
+from nldyn.scene.checks import check_computable, remarks
 from nldyn.scene.component import build_component
 from nldyn.scene.read import load_scene, parse_scene
 from nldyn.scene.run import compute
@@ -268,3 +268,20 @@ def test_what_ties_a_place_that_rides_to_one_that_does_not_is_refused(table):
         build_system(parse_scene(RIDES.format(load=[1.0, 0.0], element=TIES[table])))
     build_system(parse_scene(RIDES.format(load=[1.0, 1.0], element=TIES[table])))
     build_system(parse_scene(RIDES.format(load=[1.0, 0.0], element="")))
+
+
+@pytest.mark.parametrize("table", TIES)
+def test_modes_do_not_tell_what_a_base_carries(table):
+    modal = """
+    [modal]
+    frequencies_hz = [100.0, 100.0]
+    participation.a = [1.0, 0.0]
+    participation.b = [0.0, 1.0]
+    loads.A = [1.0, 0.0]
+    [damping]
+    modal_ratio = 0.02
+    """
+    shaken = RIDES.format(load=[1.0, 0.0], element=TIES[table])
+    scene = parse_scene(modal + shaken[shaken.index(f"[[{table}]]") :])
+    (said,) = remarks(scene, build_system(scene))
+    assert said.startswith(f"{table}[0]: displacements are relative to the base")

@@ -7,7 +7,7 @@ import pytest
 from problems import in_frequency
 
 import nldyn
-from nldyn import BaseMotion, SceneError, Stop, System, SystemModelError
+from nldyn import BaseMotion, Damper, SceneError, Spring, Stop, System, SystemModelError
 from nldyn.base.resources import example
 from nldyn.orbits.conditions import max_abs_displacement, output_slope
 from nldyn.orbits.harmonics import modal_row
@@ -165,3 +165,27 @@ def test_what_makes_no_sense_is_refused():
         with pytest.raises(SystemModelError, match=words):
             call()
     assert load_scene(example("bumper.toml")).observe is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "element"),
+    [
+        ("stops", Stop.linear("a", 1e6, gap=5e-4, against="b")),
+        ("springs", Spring("a", 10.0, against="b")),
+        ("dampers", Damper("a", 1.0, against="b")),
+    ],
+)
+def test_what_ties_places_that_a_base_carries_otherwise_is_refused(kind, element):
+    """With the masses 1 and 2 kg a base moves both by one under the load (1, 2) kg."""
+
+    def shaken(*loads):
+        return System.from_matrices(
+            np.diag([1.0, 2.0]), 4e5 * np.eye(2), {"a": [1.0, 0.0], "b": [0.0, 1.0]},
+            loads={str(number): load for number, load in enumerate(loads)},
+            excitation=[BaseMotion(str(number), 1e-3) for number in range(len(loads))],
+            **{kind: [element]},
+        )  # fmt: skip
+
+    with pytest.raises(SystemModelError, match=rf"{kind}\[0\]: a base carries 'a' otherwise"):
+        shaken([1.0, 0.0])
+    assert shaken([1.0, 2.0]).size == shaken([1.0, 0.0], [0.0, 2.0]).size == 2
