@@ -23,6 +23,9 @@ class FakeSystem:
     stops: tuple[object, ...] = ()
     frequencies_hz: tuple[float, ...] = ()
 
+    def unit(self, interface):
+        return "m"
+
 
 @dataclass(frozen=True)
 class FakeOrbit:
@@ -38,6 +41,9 @@ class FakeOrbit:
     stability: Stability = SURE
     observe: str = "middle"
     system: FakeSystem = FakeSystem()
+
+    def deepest_penetration(self, unit):
+        return self.max_penetration
 
 
 @dataclass(frozen=True)

@@ -548,7 +548,7 @@ def simulate(
     """
     from nldyn.longterm.impacts import impacts
     from nldyn.report.simulation import write_simulation
-    from nldyn.scene.build import directions_of
+    from nldyn.scene.build import direction_at
     from nldyn.scene.simulation import simulation_of
 
     scene, out = work.scene, work.out
@@ -558,7 +558,8 @@ def simulate(
         progress=work.line.counted("periods" if to_hz is None else "steps"),
     )  # fmt: skip
     hits = impacts(found.motion)
-    write_simulation(found.motion, hits, out, scene.text, scene.title, directions_of(scene))
+    along = direction_at(scene, found.motion.system.interfaces[0])
+    write_simulation(found.motion, hits, out, scene.text, scene.title, along)
     return Told([*_shown(found.motion, hits, found.spectrum), written_by(out, "simulation")])
 
 

@@ -57,8 +57,11 @@ def describe_system(system: System, residual: int = 0) -> str:
         lines.append(f"{mode + 1:>4}{hz:>19.6f}{values}{mark}")
     flexibility = "".join(f"{static_flexibility(system, name):>{width}.6g}" for name in names)
     lines.append(f"{'static flexibility m/N':<23}{flexibility}")
-    lines += [describe_stop(stop) for stop in system.stops]
-    lines += [describe_spring(spring) for spring in system.springs]
+    if system.rotations:
+        turning = ", ".join(repr(name) for name in names if name in system.rotations)
+        lines.append(f"of the rotation of {turning}: rad for m, N m for N")
+    lines += [describe_stop(stop, system.unit(stop.at)) for stop in system.stops]
+    lines += [describe_spring(spring, system.unit(spring.at)) for spring in system.springs]
     if np.any(system.spring_stiffness):
         hz = ", ".join(f"{value:.6f}" for value in system.linear.frequencies_hz)
         lines.append(f"frequencies with the springs: {hz} Hz")
@@ -67,6 +70,7 @@ def describe_system(system: System, residual: int = 0) -> str:
 
 def describe_rest(system: System) -> list[str]:
     """Say where the structure rests, and what holds it, if that is not at zero."""
+    from nldyn.orbits.history import moment_unit
     from nldyn.system.equilibrium import closed_at_rest, rest_positions
 
     found = rest_positions(system)
@@ -78,43 +82,51 @@ def describe_rest(system: System) -> list[str]:
         f"at rest: {places}",
         *(f"or at rest: {_places(system, other)}" for other in others),
         *(
-            f"at rest the stop at '{system.stops[i].at}' is closed by {depth:.6g} m: {force:.6g} N"
+            f"at rest the stop at '{system.stops[i].at}' is closed by {depth:.6g} {unit}: "
+            f"{force:.6g} {moment_unit(unit)}"
             for i, depth, force in closed_at_rest(system, q)
+            for unit in [system.unit(system.stops[i].at)]
         ),
     ]
 
 
 def _places(system: System, q: Real) -> str:
     return ", ".join(
-        f"{float(phi @ q):.6g} m at '{name}'" for name, phi in system.participation.items()
+        f"{float(phi @ q):.6g} {system.unit(name)} at '{name}'"
+        for name, phi in system.participation.items()
     )
 
 
-def describe_stop(stop: AnyStop) -> str:
-    """Say in a line where a stop is and what it does."""
+def describe_stop(stop: AnyStop, length: str = "m") -> str:
+    """Say in a line where a stop is and what it does; of a rotation the length is rad."""
+    from nldyn.orbits.history import moment_unit
     from nldyn.system.rigid_stop import RigidStop
 
     if isinstance(stop, RigidStop):
         return (
             f"rigid stop {_place(stop)}: restitution {stop.restitution_at(1.0):g}, "
-            f"gap {stop.gap:g} m, direction {stop.direction:+d}"
+            f"gap {stop.gap:g} {length}, direction {stop.direction:+d}"
         )
-    unit = "N/m" if stop.exponent == 1.0 else f"N/m^{stop.exponent:g}"
-    loss = f", dissipation {stop.dissipation:g} s/m" if stop.dissipation else ""
-    loss += f", dashpot {stop.dashpot:g} N s/m" if stop.dashpot else ""
+    force = moment_unit(length)
+    unit = f"{force}/{length}" + ("" if stop.exponent == 1.0 else f"^{stop.exponent:g}")
+    loss = f", dissipation {stop.dissipation:g} s/{length}" if stop.dissipation else ""
+    loss += f", dashpot {stop.dashpot:g} {force} s/{length}" if stop.dashpot else ""
     loss += "" if stop.pulls else " (never pulls)"
     return (
-        f"stop {_place(stop)}: {stop.stiffness:.6g} {unit}, gap {stop.gap:g} m, "
+        f"stop {_place(stop)}: {stop.stiffness:.6g} {unit}, gap {stop.gap:g} {length}, "
         f"direction {stop.direction:+d}{loss}"
     )
 
 
-def describe_spring(spring: AnySpring) -> str:
-    """Say in a line where a spring is and what it does."""
+def describe_spring(spring: AnySpring, length: str = "m") -> str:
+    """Say in a line where a spring is and what it does; of a rotation the length is rad."""
+    from nldyn.orbits.history import moment_unit
+
+    unit = f"{moment_unit(length)}/{length}"
     where = f"at '{spring.at}'" + (f" against '{spring.against}'" if spring.against else "")
     values = getattr(spring, "coefficients", None) or (getattr(spring, "stiffness", 0.0),)
-    terms = [f"{k:.6g} N/m" + (f"^{j}" if j > 1 else "") for j, k in enumerate(values, 1) if k]
-    return f"spring {where}: {', '.join(terms) or '0 N/m'}"
+    terms = [f"{k:.6g} {unit}" + (f"^{j}" if j > 1 else "") for j, k in enumerate(values, 1) if k]
+    return f"spring {where}: {', '.join(terms) or f'0 {unit}'}"
 
 
 def _place(stop: AnyStop) -> str:
@@ -142,7 +154,7 @@ def described_as_json(system: System) -> dict[str, object]:
         "static_flexibility_m_per_n": {
             name: static_flexibility(system, name) for name in system.interfaces
         },
-        "stops": [describe_stop(stop) for stop in system.stops],
+        "stops": [describe_stop(stop, system.unit(stop.at)) for stop in system.stops],
     }
 
 

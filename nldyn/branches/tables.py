@@ -16,6 +16,7 @@ from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.orbits.orbit import Orbit
 from nldyn.system.chart import parameter_name
 from nldyn.system.parameters import Parameter
+from nldyn.system.system import System
 
 if TYPE_CHECKING:
     import pandas
@@ -27,7 +28,9 @@ UNITS = {
     "period": "1",
     "frequency_hz": "Hz",
     "max_abs_displacement_m": "m",
+    "max_abs_displacement_rad": "rad",
     "max_penetration_m": "m",
+    "max_penetration_rad": "rad",
     "impacts": "1",
     "stable": "1",
     "largest_multiplier": "1",
@@ -56,13 +59,13 @@ def orbit_columns(
     Returns
     -------
     dict of str to (n,) array
-        Their units are in `UNITS`.
+        Their units are in `UNITS`: displacements of rotations are in rad, and so are penetrations
+        of stops there, in a column of their own.
     """
     columns: dict[str, list[Any]] = {
         "period": [orbit.period for orbit in orbits],
         "frequency_hz": [at_known(orbit.frequency_hz, known_hz) for orbit in orbits],
-        "max_abs_displacement_m": [orbit.max_abs_displacement for orbit in orbits],
-        "max_penetration_m": [orbit.max_penetration for orbit in orbits],
+        **_sizes(orbits),
         "impacts": [orbit.impacts for orbit in orbits],
         "stable": [orbit.stable for orbit in orbits],
         "largest_multiplier": [abs(orbit.largest_multiplier) for orbit in orbits],
@@ -75,6 +78,40 @@ def orbit_columns(
     }
     kinds: dict[str, type] = {"period": int, "impacts": int, "stable": bool}
     return {name: np.array(list_, dtype=kinds.get(name, float)) for name, list_ in columns.items()}
+
+
+def _sizes(orbits: Sequence[Orbit]) -> dict[str, list[float]]:
+    """The columns of displacements and penetrations."""
+    names = size_names(orbits[0].system, orbits[0].observe) if orbits else size_names()
+    displacement, *penetrations = names
+    deepest = {name: name.rsplit("_", 1)[1] for name in penetrations}
+    return {
+        displacement: [orbit.max_abs_displacement for orbit in orbits],
+        **{
+            name: [orbit.deepest_penetration(unit) for orbit in orbits]
+            for name, unit in deepest.items()
+        },
+    }
+
+
+def size_names(system: System | None = None, observe: str = "") -> tuple[str, ...]:
+    """Names of the columns of displacements and penetrations of a system, with their units.
+
+    Examples
+    --------
+    >>> size_names()
+    ('max_abs_displacement_m', 'max_penetration_m')
+    """
+    units = {system.unit(stop.at) for stop in system.stops} if system else set()
+    return (
+        displacement_name(system, observe),
+        *(f"max_penetration_{unit}" for unit in sorted(units or {"m"})),
+    )
+
+
+def displacement_name(system: System | None, observe: str) -> str:
+    """Name of the column of the largest displacements of an interface."""
+    return f"max_abs_displacement_{system.unit(observe) if system else 'm'}"
 
 
 def at_known(frequency_hz: float, known_hz: Sequence[float]) -> float:

@@ -118,6 +118,8 @@ def _write_interfaces(group: Any, system: System) -> None:
     set_attribute(group, "interfaces", system.interfaces)
     if system.rides:
         set_attribute(group, "rides", json.dumps({k: dict(v) for k, v in system.rides.items()}))
+    if system.rotations:
+        set_attribute(group, "rotations", tuple(sorted(system.rotations)))
     vectors = np.array([system.participation[name] for name in system.interfaces], dtype=float)
     put(group, "participation", vectors.reshape(-1, system.size), "kg^-0.5")
     if system.loads:
@@ -292,6 +294,7 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
             group.array("circulatory", n, n) if "circulatory" in group else None,
             _read_spin(group.group("spin"), n) if "spin" in group else None,
             _read_rides(group) if group.has_attribute("rides") else {},
+            frozenset(group.texts("rotations") if group.has_attribute("rotations") else ()),
         )
     except SystemModelError as error:
         if str(error).startswith(str(group.path)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from scipy.io import savemat
 from nldyn.base.arrays import SLACK
 from nldyn.base.errors import SystemModelError, check_types
 from nldyn.base.optional import optional
-from nldyn.orbits.history import History
+from nldyn.orbits.history import History, moment_unit
 from nldyn.runtime.files import check_writable, write_whole
 
 SI_UNITS = {
@@ -40,7 +40,8 @@ def write_history(history: History, path: str | Path) -> None:
     - ``.csv``: the columns of `History.table` with all their digits.
     - ``.mat``: MATLAB's level 5; ``time_s`` (k, 1), ``displacement_m`` (k, n_interfaces) and the
       ``interfaces``, ``penetration_m`` and ``force_n`` (k, n_stops), ``modal`` and
-      ``modal_velocity`` (k, n).
+      ``modal_velocity`` (k, n). Of rotations ``displacement_rad``, ``penetration_rad`` and
+      ``force_n_m``; where only some are, ``displacement`` and so on, with ``displacement_units``.
     - ``.uff``: a universal file (ASCII) with a dataset 58 for the displacement of each interface,
       and for the penetration and the force of each stop; it keeps 12 digits of values and, as
       the format has it, six of times. It needs the extra ``uff``.
@@ -108,27 +109,41 @@ def write_mat(history: History, path: Path) -> None:
     content = {
         "time_s": history.time[:, None],
         "interfaces": np.array([*history.displacement], dtype=object),
-        "displacement_m": history.displacements,
-        "penetration_m": history.penetration,
-        "force_n": history.force,
+        **with_units("displacement", history.displacements, [*history.units.values()]),
+        **with_units("penetration", history.penetration, history.stop_units),
+        **with_units("force", history.force, [*map(moment_unit, history.stop_units)], "N"),
         "modal": history.modal,
         "modal_velocity": history.modal_velocity,
     }
     savemat(str(path), content, oned_as="row")
 
 
+def with_units(name: str, values: Any, units: Sequence[str], usual: str = "m") -> dict[str, Any]:
+    """An array whose name tells the unit of its columns, or with their units beside it.
+
+    Examples
+    --------
+    >>> [list(with_units("force", None, units)) for units in (["N m"], ["N", "N m"])]
+    [['force_n_m'], ['force', 'force_units']]
+    """
+    kinds = set(units) or {usual}
+    if len(kinds) > 1:
+        return {name: values, f"{name}_units": np.array(units, dtype=object)}
+    return {f"{name}_{kinds.pop().lower().replace(' ', '_')}": values}
+
+
 def write_uff(history: History, path: Path) -> None:
     """The datasets 164 (units) and 58 (functions) of a universal file."""
     pyuff = optional("pyuff", "a file that ends in .uff")
     made = [
-        (f"displacement {name}", "m", DISPLACEMENT, values, node)
+        (f"displacement {name}", history.units[name], DISPLACEMENT, values, node)
         for node, (name, values) in enumerate(history.displacement.items(), 1)
     ]
-    for stop, (depth, force) in enumerate(
-        zip(history.penetration.T, history.force.T, strict=True), 1
+    for stop, (depth, force, unit) in enumerate(
+        zip(history.penetration.T, history.force.T, history.stop_units, strict=True), 1
     ):
-        made.append((f"penetration stop {stop - 1}", "m", DISPLACEMENT, depth, stop))
-        made.append((f"force stop {stop - 1}", "N", REACTION, force, stop))
+        made.append((f"penetration stop {stop - 1}", unit, DISPLACEMENT, depth, stop))
+        made.append((f"force stop {stop - 1}", moment_unit(unit), REACTION, force, stop))
     sets = [SI_UNITS, *(function(history.time, *one) for one in made)]
     pyuff.UFF(str(path)).write_sets(sets, "overwrite")
 

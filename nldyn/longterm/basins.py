@@ -49,7 +49,7 @@ PARALLEL = 1e-9  # what is left of one of two directions across the other
 AROUND = 2.0  # size of a plane, over that of what attractors do in it
 SAMPLES = 4096  # of a motion whose size is wanted
 PlaneState = tuple[str, str]  # "displacement" or "velocity", and of which interface
-UNITS = {"displacement": "m", "velocity": "m/s"}
+UNITS = {"displacement": "{}", "velocity": "{}/s"}  # with m or rad
 IN_PLANE = 1e-6  # of a state: its distance from a plane in which it lies
 
 
@@ -198,7 +198,10 @@ class StatePlane:
             raise SystemModelError(f"plane: the {x[0]} of '{x[1]}' moves with that of '{y[1]}'")
         along = np.linalg.solve(unit @ unit.T, unit) / sizes[:, None]
         base = base - (rows @ base) @ along
-        labels = [f"{quantity} of {name} ({UNITS[quantity]})" for quantity, name in (x, y)]
+        labels = [
+            f"{quantity} of {name} ({UNITS[quantity].format(system.unit(name))})"
+            for quantity, name in (x, y)
+        ]
         return cls(base, along[0], along[1], x_range, y_range, *labels)
 
     @classmethod
@@ -353,8 +356,14 @@ class Basin:
         """Such as ``1: 40.0 ± 0.5 %, period 2, 1 impact, -0.001 to 0.002 m at 'a'``."""
         percent = f"{100.0 * self.share:.1f} ± {100.0 * self.uncertainty:.1f} %"
         low, high = self.attractor.span
-        span = f"{low:.3g} to {high:.3g} m at '{self.attractor.interface}'"
+        unit = unit_of(self.attractor)
+        span = f"{low:.3g} to {high:.3g} {unit} at '{self.attractor.interface}'"
         return f"{self.number}: {percent}, {self.attractor.title}, {span}"
+
+
+def unit_of(attractor: Attractor) -> str:
+    """Unit of what is observed of an attractor: m, or rad of a rotation."""
+    return attractor.flow.system.unit(attractor.interface)
 
 
 @dataclass(frozen=True, eq=False)
@@ -401,6 +410,11 @@ class Basins:
         return (
             f"<Basins: {columns} x {rows} cells at {self.frequency_hz:.6g} Hz, attractors: {kinds}>"
         )
+
+    @property
+    def unit(self) -> str:
+        """Unit of what is observed of the attractors: m, or rad of a rotation."""
+        return unit_of(self.attractors[0]) if self.attractors else "m"
 
     @property
     def undecided(self) -> float:

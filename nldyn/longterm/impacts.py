@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,7 @@ FINE = 257  # points on a panel at which its polynomials are looked at
 
 UNITS = {
     "stop": "1",
+    "rotation": "1",
     "time": "s",
     "phase_deg": "deg",
     "duration": "s",
@@ -39,16 +41,27 @@ UNITS = {
     "loss": "J",
     "frequency_hz": "Hz",
 }
+OF_ROTATIONS = {
+    "speed": "rad/s",
+    "rebound_speed": "rad/s",
+    "penetration": "rad",
+    "peak_force": "N m",
+    "impulse": "N m s",
+}
 
 
 @dataclass(frozen=True, eq=False)
 class Impacts:
     """Complete contact phases in the order in which they begin; see `impacts`.
 
+    Where a stop acts on a rotation, rad stands for m and N m for N.
+
     Parameters
     ----------
     stop : (k,) int
         Index of the stop.
+    rotation : (k,) bool
+        Whether the stop acts on a rotation.
     time : (k,)
         When the contact begins, in s.
     phase_deg : (k,)
@@ -72,6 +85,7 @@ class Impacts:
     """
 
     stop: NDArray[np.int64]
+    rotation: NDArray[np.bool_]
     time: Real
     phase_deg: Real
     duration: Real
@@ -91,25 +105,40 @@ class Impacts:
         """How many, the largest speed and force, and of rigid stops the largest impulse."""
         if not len(self):
             return "<Impacts: none>"
-        rigid = np.isnan(self.peak_force)
-        most = [f"{self.speed.max():.4g} m/s"]
-        if not rigid.all():
-            most.append(f"{self.peak_force[~rigid].max():.4g} N")
-        if rigid.any():
-            most.append(f"{self.impulse[rigid].max():.4g} N s")
+        kinds = [kind for kind in (~self.rotation, self.rotation) if kind.any()]
+        most = " and ".join(", ".join(self._most(kind)) for kind in kinds)
         return (
             f"<Impacts: {len(self)} from {self.time[0]:.4g} to {self.time[-1]:.4g} s, "
-            f"at most {', '.join(most)}>"
+            f"at most {most}>"
         )
 
+    def _most(self, kind: NDArray[np.bool_]) -> Iterator[str]:
+        """The largest values of the impacts (k,) on rotations, or on none."""
+        units = UNITS | (OF_ROTATIONS if self.rotation[kind].any() else {})
+        rigid = np.isnan(self.peak_force)
+        for name, among in (
+            ("speed", kind), ("peak_force", kind & ~rigid), ("impulse", kind & rigid)
+        ):  # fmt: skip
+            if among.any():
+                yield f"{getattr(self, name)[among].max():.4g} {units[name]}"
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each column; of both kinds of stops both, that of displacements first."""
+        if not self.rotation.any():
+            return dict(UNITS)
+        if self.rotation.all():
+            return UNITS | OF_ROTATIONS
+        return UNITS | {name: f"{UNITS[name]} or {unit}" for name, unit in OF_ROTATIONS.items()}
+
     def columns(self) -> dict[str, NDArray[Any]]:
-        """The columns by name; their units are in `nldyn.longterm.impacts.UNITS`."""
+        """The columns by name; their units are in `units`."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def to_pandas(self) -> pandas.DataFrame:
         """The impacts as a table; its attribute ``attrs["units"]`` has the units."""
         frame = optional("pandas", "to_pandas").DataFrame(self.columns())
-        frame.attrs["units"] = dict(UNITS)
+        frame.attrs["units"] = self.units
         return frame
 
 
@@ -203,6 +232,7 @@ def _complete(motion: Motion) -> Impacts:
         field.name: np.concatenate([table[field.name] for table in tables] or [np.empty(0)])
         for field in fields(Impacts)
     }
+    columns["rotation"] = columns["rotation"].astype(bool)
     order = np.argsort(columns["time"], kind="stable")
     return Impacts(**{name: column[order] for name, column in columns.items()})
 
@@ -310,6 +340,7 @@ def _of_stop(motion: Motion, pieces: _Pieces, stop: int) -> dict[str, NDArray[An
     end = pieces.time[last] + pieces.duration[last]
     return {
         "stop": np.full(count, stop, dtype=np.int64),
+        "rotation": np.full(count, _turns(motion, stop)),
         "time": pieces.time[first],
         "phase_deg": np.degrees(pieces.phase[first]) % 360.0,
         "duration": end - pieces.time[first],
@@ -322,6 +353,12 @@ def _of_stop(motion: Motion, pieces: _Pieces, stop: int) -> dict[str, NDArray[An
         "loss": np.bincount(group, table.loss, count),
         "frequency_hz": pieces.hz[first],
     }
+
+
+def _turns(motion: Motion, stop: int) -> bool:
+    """Whether a stop acts on a rotation."""
+    system = motion.flow.system
+    return system.unit(system.stops[stop].at) == "rad"
 
 
 def _of_rigid_stop(motion: Motion, stop: int) -> dict[str, NDArray[Any]]:
@@ -338,6 +375,7 @@ def _of_rigid_stop(motion: Motion, stop: int) -> dict[str, NDArray[Any]]:
     none = np.zeros(time.shape)
     return {
         "stop": np.full(time.shape, stop, dtype=np.int64),
+        "rotation": np.full(time.shape, _turns(motion, stop)),
         "time": time,
         "phase_deg": np.degrees(phase) % 360.0,
         "duration": none,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,29 @@ from nldyn.base.version import software_version
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+
+def moment_unit(unit: str) -> str:
+    """Unit of what acts along a displacement of a unit.
+
+    Examples
+    --------
+    >>> moment_unit("rad"), moment_unit("m")
+    ('N m', 'N')
+    """
+    return "N m" if unit == "rad" else "N"
+
+
+def told(units: Iterable[str]) -> str:
+    """The units of columns that stand in one array, in their order; one if they are alike.
+
+    Examples
+    --------
+    >>> told(["m", "m"]), told(["m", "rad"]), told([])
+    ('m', 'm, rad', '')
+    """
+    given = list(units)
+    return given[0] if len(set(given)) == 1 else ", ".join(given)
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +55,14 @@ class History:
     modal_velocity : (k, n)
         Modal velocities.
     displacement : dict of str to (k,)
-        Displacement of each interface in m.
+        Displacement of each interface in m, of a rotation in rad.
     penetration, force : (k, n_stops)
-        Penetration (m, negative when open) and contact force (N) of each stop.
+        Penetration (m, negative when open) and contact force (N) of each stop; of a rotation in
+        rad and N m.
+    units : dict of str to str
+        Of the displacements: m, or rad of a rotation.
+    stop_units : tuple of str
+        Of the penetrations.
 
     Examples
     --------
@@ -51,6 +80,8 @@ class History:
     displacement: dict[str, Real]
     penetration: Real
     force: Real
+    units: Mapping[str, str]
+    stop_units: tuple[str, ...]
 
     def __repr__(self) -> str:
         """One line: samples, duration, interfaces."""
@@ -59,7 +90,7 @@ class History:
 
     @property
     def displacements(self) -> Real:
-        """Displacements (k, n_interfaces) in m, in the order of `displacement`."""
+        """Displacements (k, n_interfaces), in the order of `displacement`."""
         return np.reshape([*self.displacement.values()], (-1, self.time.size)).T
 
     def table(self) -> dict[str, Real]:
@@ -68,13 +99,19 @@ class History:
         Stops and modes are counted from 0.
         """
         columns = {"time_s": self.time}
-        columns |= {f"displacement_m[{name}]": u for name, u in self.displacement.items()}
-        for name, values in {
-            "penetration_m": self.penetration,
-            "force_n": self.force,
-            "modal": self.modal,
-            "modal_velocity": self.modal_velocity,
-        }.items():
+        columns |= {
+            f"displacement_{self.units[name]}[{name}]": u for name, u in self.displacement.items()
+        }
+        forces = ["n_m" if unit == "rad" else "n" for unit in self.stop_units]
+        for name, units, values in (
+            ("penetration", self.stop_units, self.penetration),
+            ("force", forces, self.force),
+        ):
+            columns |= {
+                f"{name}_{unit}[{i}]": column
+                for i, (unit, column) in enumerate(zip(units, values.T, strict=True))
+            }
+        for name, values in (("modal", self.modal), ("modal_velocity", self.modal_velocity)):
             columns |= {f"{name}[{i}]": column for i, column in enumerate(values.T)}
         return columns
 
@@ -85,9 +122,13 @@ class History:
     def to_xarray(self) -> xarray.Dataset:
         """A Dataset over ``time``, ``interface``, ``stop`` and ``mode`` (needs xarray)."""
         data = {
-            "displacement": (("time", "interface"), self.displacements, {"units": "m"}),
-            "penetration": (("time", "stop"), self.penetration, {"units": "m"}),
-            "force": (("time", "stop"), self.force, {"units": "N"}),
+            "displacement": (
+                ("time", "interface"), self.displacements, {"units": told(self.units.values())}
+            ),
+            "penetration": (("time", "stop"), self.penetration, {"units": told(self.stop_units)}),
+            "force": (
+                ("time", "stop"), self.force, {"units": told(map(moment_unit, self.stop_units))}
+            ),
             "modal": (("time", "mode"), self.modal, {"units": "m kg^0.5"}),
             "modal_velocity": (("time", "mode"), self.modal_velocity, {"units": "m kg^0.5/s"}),
         }

@@ -420,12 +420,27 @@ class Orbit:
 
     @cached_property
     def max_penetration(self) -> float:
-        """Deepest penetration over all stops in m (zero if none is touched)."""
-        heights = (
-            self._highest(index, lambda found: np.where(found.is_maximum, found.values, 0.0))
+        """Deepest penetration over all stops in m (zero if none is touched).
+
+        Of stops of rotations in rad; `deepest_penetration` tells them apart.
+        """
+        return max(self._penetrations.values(), default=0.0)
+
+    def deepest_penetration(self, unit: str) -> float:
+        """Deepest penetration over the stops of which it has this unit, m or rad."""
+        system, depths = self.system, self._penetrations
+        among = (depth for i, depth in depths.items() if system.unit(system.stops[i].at) == unit)
+        return max(among, default=0.0)
+
+    @cached_property
+    def _penetrations(self) -> dict[int, float]:
+        """Deepest penetration of each stop that is not rigid."""
+        return {
+            index: self._highest(
+                index, lambda found: np.where(found.is_maximum, found.values, 0.0)
+            )
             for index in self.system.elastic_stops
-        )
-        return max(heights, default=0.0)
+        }
 
     def _highest(self, output: int, height: Callable[[Extremes], Real]) -> float:
         """Largest height of an output's extremes; only those that may have it are solved for."""
@@ -594,6 +609,8 @@ def history_of(
         },
         depth.T,
         force.T,
+        {name: system.unit(name) for name in system.interfaces},
+        tuple(system.unit(stop.at) for stop in system.stops),
     )
 
 

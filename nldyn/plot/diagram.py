@@ -22,7 +22,15 @@ from numpy.typing import ArrayLike, NDArray
 from nldyn.base.errors import SystemModelError, check_choice, check_types
 from nldyn.branches.branch import check_branches
 from nldyn.plot.hover import show_labels
-from nldyn.plot.words import ANGLES, LENGTHS, Along, axis_unit, displacement_of, units_of
+from nldyn.plot.words import (
+    ANGLES,
+    LENGTHS,
+    Along,
+    axis_unit,
+    direction_of,
+    displacement_of,
+    units_of,
+)
 from nldyn.runtime.progress import in_notebook
 from nldyn.system.chart import THE_FREQUENCY, parameter_name
 from nldyn.system.naming import stop_name
@@ -251,6 +259,9 @@ def plot_diagram(
     for kind in special_points:
         check_choice("special_points", kind, MARKERS)
     ax = ax if ax is not None else new_axes()
+    observed = observed_interface(branches)
+    if observed:
+        direction = direction_of(branches[0].nodes[0].orbit.system, observed, direction)
     factor, unit = _unit_of(branches, unit, direction)
     colours = period_colours(branch.period for branch in branches)
     for branch in branches:
@@ -260,7 +271,6 @@ def plot_diagram(
     for kind, points in marked.items():
         _draw_marks(ax, points, kind, along, factor, size)
     ax.set_xlabel(along.label)
-    observed = observed_interface(branches)
     ax.set_ylabel(f"largest {displacement_of(observed, direction)} ({unit})")
     ax.set_yscale(yscale)
     if yscale == "linear":
@@ -378,6 +388,7 @@ def plot_orbit(
     history = orbit.history(samples)
     upper, lower = axes if axes is not None else new_axes_pair()
     places = stop_places(orbit.system, orbit.observe)
+    direction = direction_of(orbit.system, orbit.observe, direction)
     words = displacement_of(orbit.observe, direction)
     y = history.displacement[orbit.observe]
     _draw_displacement(upper, history.time, y, places, words, units_of(direction))

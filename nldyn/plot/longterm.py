@@ -33,7 +33,7 @@ from nldyn.plot.diagram import (
     plot_diagram,
     stability_runs,
 )
-from nldyn.plot.words import LENGTHS, axis_unit, displacement_of, units_of
+from nldyn.plot.words import LENGTHS, axis_unit, direction_of, displacement_of, units_of
 from nldyn.search.diagram import Diagram
 
 KIND_COLOURS = {
@@ -294,6 +294,8 @@ def plot_sweep(
         if not hz.size:
             raise SystemModelError(f"motions: entry {k} is shorter than an excitation period")
     tallest = max(float(peaks.max(initial=0.0)) for _, peaks in curves)
+    observed = interface or listed[0].system.interfaces[0]
+    direction = direction_of(listed[0].system, observed, direction)
     factor, unit = axis_unit(tallest, units_of(direction))
     ax = ax if ax is not None else new_axes()
     if diagram is not None:

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from nldyn.system.chart import FREQUENCY, parameter_name, unit_of, words_of
+from nldyn.system.naming import is_angle
 from nldyn.system.parameters import Parameter
+from nldyn.system.system import System
 
 LENGTHS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 ANGLES = ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "µrad"), (1e-9, "nrad"))
@@ -107,14 +109,19 @@ def axis_unit(largest: float, units: Sequence[tuple[float, str]]) -> tuple[float
     return units[-1] if 0.0 < size < math.inf else units[0]
 
 
-def is_angle(direction: str) -> bool:
-    """Whether an interface turns, by its direction."""
-    return direction.startswith("rotation")
-
-
 def units_of(direction: str) -> Sequence[tuple[float, str]]:
     """The units of what an interface does, the largest first."""
     return ANGLES if is_angle(direction) else LENGTHS
+
+
+def direction_of(system: System, interface: str, told: str = "") -> str:
+    """The direction of an interface as it was told, or that it is a rotation."""
+    return told or ("rotation" if system.unit(interface) == "rad" else "")
+
+
+def units_in(measure: str) -> Sequence[tuple[float, str]]:
+    """The units of what is measured in m or rad, the largest first."""
+    return ANGLES if measure == "rad" else LENGTHS
 
 
 def displacement_of(name: str = "", direction: str = "") -> str:

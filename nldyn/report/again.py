@@ -24,7 +24,7 @@ from nldyn.report.stop_spheres import stops_to_draw
 from nldyn.runtime.progress import Progress, silent
 from nldyn.runtime.result_directory import SCENE, OutputError, result_directory
 from nldyn.runtime.unfinished import unfinished_path
-from nldyn.scene.build import AnyComponent, Structure, build_structure, build_system, directions_of
+from nldyn.scene.build import AnyComponent, Structure, build_structure, build_system
 from nldyn.scene.read import load_scene
 from nldyn.scene.schema import Scene
 from nldyn.search.diagram import Diagram
@@ -113,7 +113,7 @@ def report_again(
     tables = read_tables(folder) if finished else tables_of(diagram)
     told = read_summary(folder) if finished else summary(diagram)
     if "answer" not in told:  # written before, or not yet
-        told["answer"] = answer_lines(diagram, tables["special_points"], directions_of(scene))
+        told["answer"] = answer_lines(diagram, tables["special_points"])
     progress("orbits", 0.0, 0.6)
     with result_directory(directory, "report") as new:
         page = new / "report.html"

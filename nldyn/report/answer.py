@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from nldyn.plot.diagram import branch_curve, stability_runs
-from nldyn.plot.words import FORCES, Along, axis_unit, is_angle, units_of
+from nldyn.plot.words import FORCES, Along, axis_unit, units_in
 from nldyn.system.naming import stop_name
 
 if TYPE_CHECKING:
@@ -19,19 +19,11 @@ if TYPE_CHECKING:
 
 Ranges = list[tuple[float, float]]
 
-Directions = Callable[[str], str]  # of interfaces by their names; empty where none is told
 MOST_RANGES = 5  # told, of many the widest
 NARROW = 1e-6  # share of a range of frequencies that counts as no gap
 
 
-def _no_direction(interface: str) -> str:
-    """Where no scene tells it."""
-    return ""
-
-
-def answer_lines(
-    diagram: Diagram, special_points: Table, direction_of: Directions = _no_direction
-) -> list[str]:
+def answer_lines(diagram: Diagram, special_points: Table) -> list[str]:
     """Peak, largest contact force, where the response is stable, where not, and where it jumps.
 
     Parameters
@@ -40,14 +32,12 @@ def answer_lines(
         What was computed.
     special_points : (columns, rows)
         The table of its special points, with their normal forms.
-    direction_of : callable
-        Gives the direction of an interface by its name: rotations are told in rad and N m.
 
     Returns
     -------
     list of str
         A line for each, of the contacts one for each kind: forces, moments, impulses; empty where
-        there is no branch.
+        there is no branch. Rotations are told in rad and N m.
     """
     nodes = [node for branch in diagram.branches for node in branch.nodes]
     if not nodes:
@@ -55,27 +45,27 @@ def answer_lines(
     along = Along.of(diagram.parameter, max(map(abs, diagram.limits)))
     stable = joined(stable_ranges(diagram.branches), diagram.limits)
     return [
-        _peak_line(nodes, along, diagram.observe, direction_of(diagram.observe)),
-        *_contact_lines(nodes, along, direction_of),
+        _peak_line(nodes, along, diagram.observe),
+        *_contact_lines(nodes, along),
         f"stable and periodic: {_listed(stable, along)}",
         f"nothing stable was found: {_listed(gaps(stable, diagram.limits), along)}",
         f"jumps: {jumps_line(diagram.branches, special_points, along)}",
     ]
 
 
-def _peak_line(nodes: Sequence[BranchNode], along: Along, observe: str, direction: str) -> str:
+def _peak_line(nodes: Sequence[BranchNode], along: Along, observe: str) -> str:
+    measure = nodes[0].orbit.system.unit(observe)
+
     def told(node: BranchNode) -> str:
         size = node.orbit.max_abs_displacement
-        factor, unit = axis_unit(size, units_of(direction))
+        factor, unit = axis_unit(size, units_in(measure))
         return f"{size / factor:.4g} {unit} at {along.told(node.value)}"
 
-    line = f"largest {'rotation' if is_angle(direction) else 'displacement'} of '{observe}': "
+    line = f"largest {'rotation' if measure == 'rad' else 'displacement'} of '{observe}': "
     return line + _of_stable_and_all(nodes, lambda node: node.orbit.max_abs_displacement, told)
 
 
-def _contact_lines(
-    nodes: Sequence[BranchNode], along: Along, direction_of: Directions
-) -> list[str]:
+def _contact_lines(nodes: Sequence[BranchNode], along: Along) -> list[str]:
     """The largest force or moment, and of rigid stops the largest impulse, each if there is one."""
     stops = nodes[0].orbit.system.stops
     if not stops:
@@ -84,7 +74,7 @@ def _contact_lines(
         return ["largest contact force: none, no stop is touched"]
     kinds: dict[tuple[bool, bool], list[int]] = {}
     for number, stop in enumerate(stops):
-        kind = stop.impulsive, is_angle(direction_of(stop.at))
+        kind = stop.impulsive, nodes[0].orbit.system.unit(stop.at) == "rad"
         kinds.setdefault(kind, []).append(number)
     return [_contact_line(nodes, along, among, *kind) for kind, among in sorted(kinds.items())]
 
@@ -99,8 +89,8 @@ def _contact_line(
     def told(node: BranchNode) -> str:
         hit = hits[id(node)]
         if hit is None:
-            return f"none, no {'such ' * (len(among) < len(stops))}stop is touched"
-        place = f", at {stop_name(stops, hit.stop)}" if len(stops) > 1 else ""
+            return "none"
+        place = f", {stop_name(stops, hit.stop)}" if len(stops) > 1 else ""
         value, moment = _hardness(hit), " m" if angle else ""
         scale = ((1.0, "N s"),) if rigid else FORCES
         factor, unit = next((each for each in scale if value >= each[0]), scale[-1])
@@ -113,6 +103,8 @@ def _contact_line(
         (True, False): "largest impulse of an impact",
         (True, True): "largest angular impulse of an impact",
     }[rigid, angle]
+    if not any(hits.values()):
+        return f"{name}: none, no {'such ' * (len(among) < len(stops))}stop is touched"
     return f"{name}: " + _of_stable_and_all(nodes, lambda o: _hardness(hits[id(o)]), told)
 
 

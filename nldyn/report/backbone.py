@@ -9,11 +9,12 @@ from matplotlib.axes import Axes
 
 from nldyn.branches.backbone import Backbone, farthest_from
 from nldyn.curves.curves import Curve
-from nldyn.plot.diagram import PERIOD_COLOURS, file_axes, length_unit, save_figure
+from nldyn.plot.diagram import PERIOD_COLOURS, file_axes, save_figure
+from nldyn.plot.words import axis_unit, units_in
 from nldyn.report.results import write_table
 from nldyn.runtime.result_directory import result_directory
 
-COLUMNS = ("frequency_hz", "energy_j", "amplitude_m", "impacts", "stable", "error")
+COLUMNS = ("frequency_hz", "energy_j", "amplitude_{unit}", "impacts", "stable", "error")
 
 
 def write_backbone(
@@ -42,7 +43,8 @@ def write_backbone(
         strict=True,
     )
     with result_directory(directory, "backbone") as folder:
-        write_table(folder / "backbone.csv", COLUMNS, rows)
+        names = [name.format(unit=measure_of(found)) for name in COLUMNS]
+        write_table(folder / "backbone.csv", names, rows)
         ax = plot_backbone(found, title)
         if forced is not None:
             table = forced.table()
@@ -54,19 +56,27 @@ def write_backbone(
     return Path(directory)
 
 
+def measure_of(found: Backbone) -> str:
+    """In which the amplitudes are, m or rad."""
+    orbit = found.orbits[0]
+    return orbit.system.unit(orbit.observe)
+
+
 def draw_forced(ax: Axes, forced: Curve, found: Backbone) -> None:
     """Add a curve of phase resonance to the backbone that is drawn."""
-    unit_m = length_unit(float(found.amplitude.max()))[0]
+    factor, _ = axis_unit(float(found.amplitude.max()), units_in(measure_of(found)))
     sizes = np.array([farthest_from(found.rest_m, orbit) for orbit in forced.orbits])
     hz = [orbit.frequency_hz for orbit in forced.orbits]
-    ax.plot(hz, sizes / unit_m, "--", color=PERIOD_COLOURS[1], label="forced, in phase resonance")
+    ax.plot(hz, sizes / factor, "--", color=PERIOD_COLOURS[1], label="forced, in phase resonance")
     ax.legend(fontsize="small")
 
 
 def plot_backbone(found: Backbone, title: str = "") -> Axes:
     """Draw the amplitude against the frequency of the free motion; crosses are unstable."""
     ax = file_axes()
-    factor, unit = length_unit(float(found.amplitude.max()))
+    measure = measure_of(found)
+    factor, unit = axis_unit(float(found.amplitude.max()), units_in(measure))
+    what = "rotation" if measure == "rad" else "displacement"
     ax.plot(found.frequency_hz, found.amplitude / factor, ".-", color=PERIOD_COLOURS[0])
     unstable = ~found.stable
     if unstable.any():
@@ -74,7 +84,7 @@ def plot_backbone(found: Backbone, title: str = "") -> Axes:
         ax.plot(found.frequency_hz[unstable], sizes, "x", color="0.2", label="unstable")
         ax.legend(fontsize="small")
     ax.set_xlabel("frequency of the free motion (Hz)")
-    ax.set_ylabel(f"largest displacement from rest at '{found.orbits[0].observe}' ({unit})")
+    ax.set_ylabel(f"largest {what} from rest at '{found.orbits[0].observe}' ({unit})")
     name = f"Backbone of mode {found.mode}"
     ax.set_title(f"{title}: {name.lower()}" if title else name)
     return ax

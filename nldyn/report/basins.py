@@ -14,8 +14,8 @@ from nldyn.runtime.result_directory import result_directory
 
 COLUMNS = (
     "attractor", "name", "share", "share_uncertainty", "period", "impacts_per_period", "interface",
-    "min_displacement_m", "max_displacement_m", "largest_exponent_per_s", "integrity", "distance",
-    "evidence",
+    "min_displacement_{unit}", "max_displacement_{unit}", "largest_exponent_per_s", "integrity",
+    "distance", "evidence",
 )  # fmt: skip
 
 
@@ -28,7 +28,8 @@ def write_basins(found: Basins, directory: str | Path, text: str, title: str = "
         If the directory holds only other people's files or cannot be written.
     """
     with result_directory(directory, "basins") as folder:
-        write_table(folder / "attractors.csv", COLUMNS, attractor_rows(found))
+        names = [name.format(unit=found.unit) for name in COLUMNS]
+        write_table(folder / "attractors.csv", names, attractor_rows(found))
         columns = (found.plane.x_label, found.plane.y_label, "attractor", "phase", "periods")
         write_table(folder / "basins.csv", columns, cell_rows(found))
         ax = plot_basins(found, file_axes(7.0, 5.5))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,7 @@ from nldyn.orbits.harmonics import harmonics
 from nldyn.orbits.orbit import Orbit
 from nldyn.plot.diagram import MARKER_NAMES, beside_stable, orbit_title, stop_places
 from nldyn.plot.orbit import FLOOR, drawn_phases, motion_at
-from nldyn.plot.words import Along, is_angle
+from nldyn.plot.words import Along
 from nldyn.system.naming import stop_name
 
 MOST_POINTS = 120  # that can be looked at, beside the special points
@@ -256,12 +256,12 @@ def shown_phases(orbit: Orbit, count: int, first: float) -> Real:
     return np.unique(np.concatenate([steps, contacts, [first]]) % end)
 
 
-def stops_of(orbit: Orbit, direction_of: Callable[[str], str]) -> dict[str, Any]:
+def stops_of(orbit: Orbit) -> dict[str, Any]:
     """The stops' names, and which act on rotations."""
     system = orbit.system
     return {
         "names": [stop_name(system.stops, index) for index in range(len(system.stops))],
-        "turn": [is_angle(direction_of(stop.at)) for stop in system.stops],
+        "turn": [system.unit(stop.at) == "rad" for stop in system.stops],
     }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import textwrap
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
@@ -24,7 +24,7 @@ from nldyn.plot.diagram import (
     stability_runs,
     stop_places,
 )
-from nldyn.plot.words import Along, axis_unit, displacement_of, is_angle, units_of
+from nldyn.plot.words import Along, axis_unit, direction_of, displacement_of, units_of
 from nldyn.report.deflection import surface_content
 from nldyn.report.offline import Table, as_table, versions, write_html
 from nldyn.report.orbit_content import (
@@ -38,9 +38,10 @@ from nldyn.report.orbit_content import (
     stops_of,
 )
 from nldyn.report.stop_spheres import not_drawn
-from nldyn.scene.build import direction_at, directions_of
+from nldyn.scene.build import direction_at
 from nldyn.search.diagram import Diagram
 from nldyn.system.chart import THE_FREQUENCY, parameter_name
+from nldyn.system.naming import is_angle
 
 if TYPE_CHECKING:
     import cms
@@ -131,10 +132,12 @@ def page_content(
     branches = diagram.branches
     told = told_branches(diagram, tables)
     heights = [[node.orbit.max_abs_displacement for node in branch.nodes] for branch in told]
+    system = branches[0].points[0].system if branches else None
     direction = direction_at(scene, diagram.observe) if scene else ""
+    if system is not None:
+        direction = direction_of(system, diagram.observe, direction)
     factor, unit = axis_unit(max((max(y) for y in heights), default=1.0), units_of(direction))
     along = Along.of(diagram.parameter, max(map(abs, diagram.limits)))
-    turns = turning(branches, direction, directions_of(scene))
     chosen = chosen_orbits(branches, heights)
     kept = kept_points(branches)
     notes = [*notes, *dict.fromkeys(diagram.notes), *limits(diagram, chosen, kept)]
@@ -148,7 +151,7 @@ def page_content(
         "along": along.label,
         "place": ["" if along.in_frequency else f"{along.noun} ", along.unit],
         "observed": displacement_of(diagram.observe, direction),
-        "angle": "max_abs_displacement" in turns,
+        "angle": is_angle(direction),
         "natural_hz": natural_hz(diagram),
         "gaps": gaps_of(diagram),
         "many": MANY_MARKS,
@@ -159,16 +162,16 @@ def page_content(
         "branches": drawn_branches(told, kept, along, factor, unit),
         "special": special_marks(told, along, factor, unit),
         "kinds": MARKER_NAMES,
-        "stops": stops_of(branches[0].points[0], directions_of(scene)) if branches else NO_STOPS,
+        "stops": stops_of(branches[0].points[0]) if branches else NO_STOPS,
         "orbits": orbits,
         "tables": {
             "special points": special_table(tables["special_points"], along, factor, unit),
-            "branches": in_radians(branch_table(branches, tables, along), turns),
-            "points": in_radians(as_table(kept_rows(tables["points"], branches, kept)), turns),
+            "branches": branch_table(branches, tables, along),
+            "points": as_table(kept_rows(tables["points"], branches, kept)),
         },
         "errors": error_table(diagram, tables, summary, orbits),
         "versions": versions(),
-        "system": repr(branches[0].points[0].system) if branches else "",
+        "system": repr(system) if system else "",
         "scene": scene.text if scene else "",
     }
     if surface is not None:
@@ -253,7 +256,7 @@ def told_branches(diagram: Diagram, tables: Mapping[str, Table]) -> list[ToldBra
         nodes = [
             ToldPoint(
                 ToldOrbit(
-                    row["max_abs_displacement_m"],
+                    row["max_abs_displacement"],
                     row["impacts"],
                     bool(row["stable"]),
                     row["largest_multiplier"],
@@ -267,7 +270,7 @@ def told_branches(diagram: Diagram, tables: Mapping[str, Table]) -> list[ToldBra
             ToldSpecial(
                 str(row["type"]),
                 ToldPoint(
-                    ToldOrbit(row["max_abs_displacement_m"], row["impacts"]),
+                    ToldOrbit(row["max_abs_displacement"], row["impacts"]),
                     each.point.arclength,
                     row[name_of_value],
                 ),
@@ -281,9 +284,16 @@ def told_branches(diagram: Diagram, tables: Mapping[str, Table]) -> list[ToldBra
 
 
 def records(table: Table) -> Iterator[dict[str, Any]]:
-    """The rows of a table by the names of its columns."""
+    """The rows of a table by the names of its columns; those of sizes without m or rad.
+
+    Examples
+    --------
+    >>> list(records((("impacts", "max_penetration_rad"), [(1, 0.2)])))
+    [{'impacts': 1, 'max_penetration': 0.2}]
+    """
     columns, rows = table
-    return (dict(zip(columns, row, strict=True)) for row in rows)
+    names = [column.removesuffix("_m").removesuffix("_rad") for column in columns]
+    return (dict(zip(names, row, strict=True)) for row in rows)
 
 
 def kept_points(branches: Sequence[Branch]) -> list[list[int]]:
@@ -392,34 +402,11 @@ def special_table(table: Table, along: Along, factor: float, unit: str) -> dict[
     size_name = f"largest {'rotation' if unit.endswith('rad') else 'displacement'} ({unit})"
     rows = []
     for row in records(table):
-        value, size = row[along.column] / along.factor, row["max_abs_displacement_m"] / factor
+        value, size = row[along.column] / along.factor, row["max_abs_displacement"] / factor
         told = [row["meaning"], row["type"], float(f"{value:.6g}"), float(f"{size:.6g}")]
         rows.append([*told, row["branch"], row.get("period"), row.get("impacts")])
     columns = ["meaning", "type", along.head, size_name]
     return {"columns": [*columns, "branch", "period", "impacts"], "rows": rows}
-
-
-def turning(
-    branches: Sequence[Branch], direction: str, direction_of: Callable[[str], str]
-) -> set[str]:
-    """Columns in rad instead of m: displacements of a rotation, penetrations if all stops turn."""
-    stops = branches[0].points[0].system.stops if branches else ()
-    found = {"max_abs_displacement"} if is_angle(direction) else set()
-    if stops and all(is_angle(direction_of(stop.at)) for stop in stops):
-        found.add("max_penetration")
-    return found
-
-
-def in_radians(table: dict[str, Any], turns: Collection[str]) -> dict[str, Any]:
-    """A table whose columns of some names are in rad.
-
-    Examples
-    --------
-    >>> in_radians({"columns": ["size_m", "gap_m"], "rows": []}, {"gap"})["columns"]
-    ['size_m', 'gap_rad']
-    """
-    names = {f"{name}_m": f"{name}_rad" for name in turns}
-    return {**table, "columns": [names.get(column, column) for column in table["columns"]]}
 
 
 def rounded(values: Iterable[float]) -> list[float]:
@@ -454,10 +441,11 @@ def branch_table(
     branches: Sequence[Branch], tables: Mapping[str, Table], along: Along
 ) -> dict[str, Any]:
     """Branches, one a row: where they go, why they end, and the largest errors along them."""
+    size = next(name for name in tables["points"][0] if name.startswith("max_abs_displacement"))
     columns = (
         "branch", "period", "points", "special_points", f"lowest {along.head}",
         f"highest {along.head}",
-        "max_abs_displacement_m", "stable_points", "largest_relative_error",
+        size, "stable_points", "largest_relative_error",
         "largest_liouville_error", "largest_uncertainty", "first_end", "last_end",
     )  # fmt: skip
     points, ends = records(tables["points"]), records(tables["ends"])
@@ -473,7 +461,7 @@ def branch_table(
                 len(branch.special_points),
                 min(values),
                 max(values),
-                max(row["max_abs_displacement_m"] for row in told),
+                max(row["max_abs_displacement"] for row in told),
                 sum(int(row["stable"]) for row in told),
                 largest([orbit.error for orbit in branch.points]),
                 largest([row["liouville_error"] for row in told]),

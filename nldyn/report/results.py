@@ -19,17 +19,16 @@ from nldyn.base.version import software_version
 from nldyn.bifurcations.normal_forms import normal_form
 from nldyn.branches.cascades import cascades_in
 from nldyn.branches.endings import Ending
-from nldyn.branches.tables import at_known, orbit_columns
+from nldyn.branches.tables import at_known, orbit_columns, size_names
 from nldyn.io.store import save
 from nldyn.plot.diagram import save_diagram
 from nldyn.report.answer import answer_lines
 from nldyn.report.offline import Table
 from nldyn.report.page import write_page
 from nldyn.runtime.result_directory import result_directory
-from nldyn.scene.build import direction_at, directions_of
+from nldyn.scene.build import direction_at
 from nldyn.search.exploration import Exploration
 from nldyn.system.chart import THE_FREQUENCY, parameter_name
-from nldyn.system.parameters import Parameter
 
 if TYPE_CHECKING:
     from nldyn.bifurcations.point import BranchNode
@@ -40,13 +39,14 @@ if TYPE_CHECKING:
     from nldyn.search.diagram import Diagram
     from nldyn.search.exploration import Exploration
 
+DISPLACEMENT, PENETRATION = "max_abs_displacement", "max_penetration"  # without their units
 BRANCH_COLUMNS = (
     "branch",
     "point",
     "period",
     "frequency_hz",
-    "max_abs_displacement_m",
-    "max_penetration_m",
+    DISPLACEMENT,
+    PENETRATION,
     "impacts",
     "stable",
     "largest_multiplier",
@@ -59,7 +59,7 @@ SPECIAL_COLUMNS = (
     "period",
     "type",
     "frequency_hz",
-    "max_abs_displacement_m",
+    DISPLACEMENT,
     "impacts",
     "normal_form",
     "coefficient",
@@ -72,7 +72,7 @@ END_COLUMNS = (
     "branch",
     "end",
     "frequency_hz",
-    "max_abs_displacement_m",
+    DISPLACEMENT,
     "broken_off",
     "reason",
 )
@@ -144,7 +144,7 @@ def write_results(
         title = scene.title if scene else ""
         direction = direction_at(scene, diagram.observe) if scene else ""
         save_diagram(diagram, folder, title=title, direction=direction, yscale=yscale)
-        answer = answer_lines(diagram, tables["special_points"], directions_of(scene))
+        answer = answer_lines(diagram, tables["special_points"])
         told = {**summary(diagram), "answer": answer}
         text = json.dumps(told, indent=1, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
@@ -159,23 +159,28 @@ def write_results(
 def tables_of(diagram: Diagram) -> dict[str, Table]:
     """The tables of points, special points and ends; normal forms of special points take time."""
     return {
-        "points": (with_value(BRANCH_COLUMNS, diagram.parameter), list(branch_rows(diagram))),
-        "special_points": (
-            with_value(SPECIAL_COLUMNS, diagram.parameter), list(special_rows(diagram))
-        ),
-        "ends": (with_value(END_COLUMNS, diagram.parameter), list(end_rows(diagram))),
+        name: (columns_of(columns, diagram), list(rows(diagram)))
+        for name, columns, rows in (
+            ("points", BRANCH_COLUMNS, branch_rows),
+            ("special_points", SPECIAL_COLUMNS, special_rows),
+            ("ends", END_COLUMNS, end_rows),
+        )
     }
 
 
-def with_value(columns: tuple[str, ...], parameter: Parameter) -> tuple[str, ...]:
-    """Columns with that of the parameter before the frequency, where it is another one."""
-    at = columns.index("frequency_hz")
-    return (*columns[:at], *dict.fromkeys((parameter_name(parameter), *columns[at:])))
+def columns_of(columns: tuple[str, ...], diagram: Diagram) -> tuple[str, ...]:
+    """Columns with that of the parameter before the frequency, and sizes with their units."""
+    system = diagram.branches[0].points[0].system if diagram.branches else None
+    displacement, *penetrations = size_names(system, diagram.observe)
+    sizes = {DISPLACEMENT: [displacement], PENETRATION: penetrations}
+    named = [name for column in columns for name in sizes.get(column, [column])]
+    at = named.index("frequency_hz")
+    return (*named[:at], *dict.fromkeys((parameter_name(diagram.parameter), *named[at:])))
 
 
 def branch_rows(diagram: Diagram) -> Iterable[tuple[object, ...]]:
     """Give the rows of ``branches.csv``, one for each point of each branch."""
-    names = with_value(BRANCH_COLUMNS, diagram.parameter)[2:]
+    names = columns_of(BRANCH_COLUMNS, diagram)[2:]
     for branch in diagram.branches:
         values = np.array([node.value for node in branch.nodes])
         columns = {parameter_name(diagram.parameter): values}

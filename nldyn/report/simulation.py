@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from nldyn.base.arrays import Real
+from nldyn.branches.tables import displacement_name
 from nldyn.io.history_files import write_pieces
 from nldyn.longterm.impacts import Impacts
 from nldyn.longterm.simulation import Motion
@@ -34,7 +34,7 @@ def write_simulation(
     directory: str | Path,
     text: str,
     title: str = "",
-    direction_of: Callable[[str], str] = lambda interface: "",
+    direction: str = "",
 ) -> Path:
     """Write ``motion.csv``, ``impacts.csv``, ``simulation.png`` and ``.svg``, and the scene.
 
@@ -46,19 +46,19 @@ def write_simulation(
         If the directory holds only other people's files or cannot be written.
     """
     observed = check_observe(motion.system, None)
-    direction = direction_of(observed)
     hz, peaks = motion.period_peaks(observed)
     samples = PER_PERIOD * max(hz.size, 1)
     curve = Drawn(observed, math.ceil(samples / BARS) if samples > DRAWN else 1)
     with result_directory(directory, "simulation") as folder:
         pieces = motion.histories(samples, curve.each * max(AT_ONCE // curve.each, 1))
         write_pieces(map(curve.seen, pieces), folder / "motion.csv")
-        columns = hits.columns()
+        columns = {**hits.columns(), "rotation": hits.rotation.astype(int)}
         rows = zip(*(column.tolist() for column in columns.values()), strict=True)
         write_table(folder / "impacts.csv", columns, rows)
         if motion.rate_hz_per_s:
             rows = zip(hz.tolist(), peaks.tolist(), strict=True)
-            write_table(folder / "peaks.csv", ("frequency_hz", "max_abs_displacement_m"), rows)
+            size = displacement_name(motion.system, observed)
+            write_table(folder / "peaks.csv", ("frequency_hz", size), rows)
         ax = (
             plot_sweep(motion, direction=direction)
             if motion.rate_hz_per_s

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from fem.render import StopSphere
-from nldyn.plot.words import is_angle
 from nldyn.scene.build import place
 from nldyn.scene.schema import Scene
+from nldyn.system.naming import is_angle
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 

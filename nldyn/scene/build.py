@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -30,6 +30,7 @@ from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import Scene
 from nldyn.scene.stops_and_loads import acting_elements
 from nldyn.system.loads import BaseMotion
+from nldyn.system.naming import is_angle
 from nldyn.system.ride import carried_apart, told_apart
 from nldyn.system.spin import Spin
 from nldyn.system.system import Elements, System
@@ -271,11 +272,6 @@ def direction_at(scene: Scene, interface: str) -> str:
     return getattr(given.get(name), "direction", None) or ""
 
 
-def directions_of(scene: Scene | None) -> Callable[[str], str]:
-    """What gives the direction of an interface by its name; empty where none is told."""
-    return lambda interface: direction_at(scene, interface) if scene is not None else ""
-
-
 def build_candidates(scene: Scene, component: AnyComponent | None = None) -> Candidates:
     """The modes among which a scene with a tolerance chooses, by its linear response alone.
 
@@ -365,6 +361,8 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
     """
     system = _relative_system(scene, reduced)
     _check_rides(scene, system)
+    turning = (name for name in system.interfaces if is_angle(direction_at(scene, name)))
+    system = replace(system, rotations=frozenset(turning))
     if scene.observe is None or not scene.observe.absolute:
         return system
     with told_as(scene, ("observe", "absolute"), SystemModelError):

@@ -7,6 +7,11 @@ from collections.abc import Sequence
 from nldyn.system.rigid_stop import AnyStop
 
 
+def is_angle(direction: str) -> bool:
+    """Whether an interface turns, by its direction."""
+    return direction.startswith("rotation")
+
+
 def stop_name(stops: Sequence[AnyStop], index: int) -> str:
     """Name a stop by its interfaces and, where several share them, by its direction and gap.
 

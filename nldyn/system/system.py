@@ -108,6 +108,9 @@ class System:
         What of both is in proportion to the speed of a shaft, in modal coordinates.
     rides : mapping of str to mapping
         Interfaces whose displacement is observed as an absolute one, see `with_absolute`.
+    rotations : set of str
+        Interfaces that turn: their displacement is an angle in rad, and what acts there a moment.
+        Nothing is computed otherwise for it; tables and pictures have their units from it.
 
     Raises
     ------
@@ -135,6 +138,7 @@ class System:
     circulatory: Real | None = None
     spin: Spin | None = None
     rides: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    rotations: frozenset[str] = frozenset()
 
     def __repr__(self) -> str:
         """One line: modes, interfaces, and what acts."""
@@ -425,6 +429,10 @@ class System:
         """Whether a force of a stop or bond depends on the speed."""
         lossy = [stop.depends_on_speed for stop in self.stops]
         return any(lossy + [bond.depends_on_speed for bond in self.bonds])
+
+    def unit(self, interface: str) -> str:
+        """Unit of the displacement of an interface: m, or rad of a rotation."""
+        return "rad" if interface in self.rotations else "m"
 
     def output(self, interface: str) -> int:
         """Number of the displacement of an interface among the outputs of a flow map.
@@ -780,6 +788,9 @@ class System:
 
     def _check_interfaces(self) -> None:
         known = ", ".join(self.participation) or "none"
+        for turning in self.rotations:
+            if turning not in self.participation:
+                raise SystemModelError(f"rotations: unknown interface '{turning}'; known: {known}")
         for kind, elements, classes in (
             ("stop", self.stops, AnyStop),
             ("damper", self.dampers, AnyDamper),
@@ -882,6 +893,7 @@ def same_system(a: System, b: System) -> bool:
         == (b.stops, b.dampers, b.excitation, b.springs)
         and same_spin(a.spin, b.spin)
         and a.rides == b.rides
+        and set(a.rotations) == set(b.rotations)
     )
 
 

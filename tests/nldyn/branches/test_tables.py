@@ -7,14 +7,24 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from nldyn import Diagram, SystemModelError
-from nldyn.branches.tables import UNITS
-from nldyn.report.results import BRANCH_COLUMNS
+from nldyn import (
+    Diagram,
+    HarmonicForce,
+    Stop,
+    System,
+    SystemModelError,
+    impacts,
+    solve_orbit,
+)
+from nldyn.branches.tables import UNITS, orbit_columns
+from nldyn.report.results import BRANCH_COLUMNS, columns_of
 
 
 def test_rows_belong_to_the_orbits(harmonic_branch):
     table = harmonic_branch.table()
-    assert set(BRANCH_COLUMNS) - {"branch", "point"} <= set(table) <= set(UNITS)
+    assert {*columns_of(BRANCH_COLUMNS, Diagram((harmonic_branch,), (5.7, 90.0), "middle"))} - {
+        "branch", "point"
+    } <= set(table) <= set(UNITS)  # fmt: skip
     for i in (0, 100, -1):
         orbit = harmonic_branch.points[i]
         assert table["max_abs_displacement_m"][i] == orbit.max_abs_displacement
@@ -32,6 +42,32 @@ def test_rows_of_special_points(harmonic_branch):
     assert table["frequency_error"].max() < 1e-6
     empty = harmonic_branch.table("requested")
     assert {column.shape for column in empty.values()} == {(0,)}
+
+
+def test_columns_of_rotations_are_in_rad():
+    """A beam that turns at one end, with a stop of each kind: every number is in its own column."""
+    stops = [Stop.linear("turn", 5.0, gap=3e-4), Stop.linear("tip", 5e3, gap=1e-4)]
+    system = System.from_modal(
+        [10.0], {"turn": [2.0], "tip": [0.5]}, modal_damping=0.05, stops=stops,
+        excitation=[HarmonicForce("tip", 0.5)],
+    )  # fmt: skip
+    system = replace(system, rotations=frozenset({"turn"}))
+    orbit = solve_orbit(system, frequency_hz=9.5)
+    table = orbit_columns([orbit])
+    history = orbit.history(20_000)
+    depths = history.penetration.max(axis=0)
+    assert depths.min() > 0.0
+    for unit, depth in zip(("rad", "m"), depths, strict=True):
+        assert table[f"max_penetration_{unit}"][0] == pytest.approx(depth, rel=1e-5)
+        assert UNITS[f"max_penetration_{unit}"] == unit
+    assert table["max_abs_displacement_rad"][0] == orbit.max_abs_displacement
+    assert "max_abs_displacement_m" not in table
+    assert {"displacement_rad[turn]", "displacement_m[tip]", "penetration_rad[0]",
+            "penetration_m[1]", "force_n_m[0]", "force_n[1]"} < set(history.table())  # fmt: skip
+    found = impacts(orbit)
+    assert np.array_equal(found.rotation, found.stop == 0) and set(found.stop) == {0, 1}
+    assert found.units["penetration"] == "m or rad"
+    assert "rad/s" in repr(found) and "N m" in repr(found)
 
 
 def test_an_unknown_part_is_refused(harmonic_branch):

@@ -1,5 +1,7 @@
 """The five lines with which a run and its report begin."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,11 @@ def oscillator(**more):
         [[MASS]], [[STIFFNESS]], {"middle": [1.0]}, modal_damping=RATIO,
         excitation=[Unbalance("middle", UNBALANCE)], **more,
     )  # fmt: skip
+
+
+def diagram_of(system, limits=(10.0, 18.0)):
+    branch = continue_branch(solve_orbit(system, 10.0), limits)
+    return Diagram((branch,), limits, "middle")
 
 
 def lines_of(found):
@@ -40,8 +47,8 @@ def test_a_linear_resonance_has_its_peak_where_theory_says_and_is_stable_through
 def test_a_branch_that_folds_jumps_at_its_folds_and_leaves_nothing_beyond_the_flip():
     """Hardening by a stop: up to a fold where the frequency rises, down to one where it falls."""
     system = oscillator(stops=[Stop.linear("middle", 5e3, gap=2e-5)])
-    branch = continue_branch(solve_orbit(system, 10.0), (10.0, 18.0))
-    found = Diagram((branch,), (10.0, 18.0), "middle")
+    found = diagram_of(system)
+    (branch,) = found.branches
     folds = [p.frequency_hz for p in branch.special_points if p.kind == "LP"]
     assert len(folds) == 2
     *_, stable, missing, jumps = lines_of(found)
@@ -58,12 +65,10 @@ def test_a_branch_that_folds_jumps_at_its_folds_and_leaves_nothing_beyond_the_fl
 def test_rotations_are_told_in_rad_and_their_contacts_in_newton_metres():
     """The same numbers as of a displacement, in other words and units."""
     system = oscillator(stops=[Stop.linear("middle", 5e3, gap=2e-5)])
-    branch = continue_branch(solve_orbit(system, 10.0), (10.0, 18.0))
-    found = Diagram((branch,), (10.0, 18.0), "middle")
-    special = tables_of(found)["special_points"]
-    straight = answer_lines(found, special, lambda name: "y")
-    turned = answer_lines(found, special, lambda name: "rotation_z")
-    assert straight == lines_of(found)
+    straight, turned = (
+        lines_of(diagram_of(each))
+        for each in (system, replace(system, rotations=frozenset({"middle"})))
+    )
     assert turned[0] == straight[0].replace("displacement", "rotation").replace("µm", "µrad")
     assert turned[1] == straight[1].replace("force", "moment").replace(" mN ", " mN m ")
     assert turned[2:] == straight[2:]
@@ -73,8 +78,8 @@ def test_forces_and_impulses_are_told_apart_where_stops_are_of_both_kinds():
     """An elastic stop on one side, a rigid one on the other: each with its own largest."""
     stops = [Stop.linear("middle", 5e3, gap=2e-5), RigidStop("middle", 0.6, gap=4e-5, direction=-1)]
     system = oscillator(stops=stops)
-    branch = continue_branch(solve_orbit(system, 10.0), (10.0, 12.6))
-    lines = lines_of(Diagram((branch,), (10.0, 12.6), "middle"))
+    found = diagram_of(system, (10.0, 12.6))
+    (branch,), lines = found.branches, lines_of(found)
     assert [line.split(":")[0] for line in lines[1:3]] == [
         "largest contact force", "largest impulse of an impact"
     ]  # fmt: skip

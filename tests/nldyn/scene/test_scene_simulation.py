@@ -89,7 +89,8 @@ def test_a_push_against_a_stop_has_the_impact_of_its_closed_form(tmp_path):
     duration = 2.0 / w * math.atan2(v / w, -force / k)
     peak = force + k * math.hypot(force / k, v / w)
     exact = {
-        "stop": 0.0, "time": begin, "phase_deg": 360.0 * 0.4 * begin, "duration": duration,
+        "stop": 0.0, "rotation": 0.0, "time": begin, "phase_deg": 360.0 * 0.4 * begin,
+        "duration": duration,
         "speed": v, "rebound_speed": v, "penetration": peak / k, "peak_force": peak,
         "impulse": 2.0 * m * v + force * duration, "work": 0.5 * peak**2 / k, "frequency_hz": 0.4,
     }  # fmt: skip
