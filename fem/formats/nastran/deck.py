@@ -12,7 +12,7 @@ from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError
 from fem.formats.nastran.cards import INCLUDE, Card, cards_of, lines_of
 from fem.formats.nastran.control import Control, divided
-from fem.formats.nastran.known import LEFT_OUT, READ, advice
+from fem.formats.nastran.known import FIELDS, LEFT_OUT, READ, advice
 from fem.formats.nastran.systems import CARDS as SYSTEM_CARDS
 from fem.formats.nastran.systems import Systems
 from fem.mesh.attachments import LeftOut
@@ -164,6 +164,7 @@ def read_deck(path: Path, folders: Sequence[Path], ignore: Iterable[str]) -> Dec
             deck.ignored.add(card.name)
             deck.leave_out(card.name, card.place, "it is to be ignored")
         elif card.name in READ:
+            _check_end(card)
             deck.cards.setdefault(card.name, []).append(card)
         elif card.name in LEFT_OUT:
             deck.leave_out(card.name, card.place, LEFT_OUT[card.name])
@@ -173,6 +174,17 @@ def read_deck(path: Path, folders: Sequence[Path], ignore: Iterable[str]) -> Dec
     _read_systems(deck)
     _read_points(deck)
     return deck
+
+
+def _check_end(card: Card) -> None:
+    """Raise ModelError where fields stand behind the last one of a card."""
+    most = FIELDS.get(card.name, len(card.fields))
+    more = [at for at in range(most, len(card.fields)) if card.fields[at] not in ("", "+")]
+    if more:
+        raise card.fail(
+            f"has {card.fields[more[0]]!r} in field {more[0] + 2}, behind its last one; an element"
+            " or a point needs a card of its own"
+        )
 
 
 def _read_systems(deck: Deck) -> None:

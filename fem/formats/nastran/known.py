@@ -89,6 +89,19 @@ ADVICE = {card: advice for advice, cards in _REFUSED.items() for card in cards.s
 """What to do instead of some of the cards that are refused."""
 
 REPEATED = "it repeats the card before it; write the cards out"
+_FIELDS = {
+    4: "CROD CTUBE CVISC CELAS3 CELAS4 CDAMP3 CDAMP4 CMASS3 CMASS4",
+    6: "CELAS1 CDAMP1 CDAMP2 CMASS1 CMASS2 PROD",
+    7: "SPC PSOLID",
+    8: "CELAS2 CONROD GRID GRDSET PELAS PDAMP PMASS PVISC CORD1R CORD1C CORD1S RBAR",
+    11: "PSHELL CORD2R CORD2C CORD2S",
+    14: "CONM2 CBUSH CQUAD4 CQUADR",
+    18: "CBEAM",
+    24: "CONM1",
+}
+FIELDS = {card: most for most, cards in _FIELDS.items() for card in cards.split()}
+"""How many fields some cards have: NASTRAN of old puts two elements on one, which is refused."""
+
 UNKNOWN = "it is neither read nor known to be without effect on stiffness, mass and connection"
 
 PARAMETERS_WITH_EFFECT = frozenset({"WTMASS", "AUTOSPC", "CM1", "CM2", "CK1", "CK2"})

@@ -85,6 +85,7 @@ def test_coordinate_systems_stand_in_chains(tmp_path):
         ("SPC1,1,7,1\n", "SPC1: '7' in field 4 are not directions out of 1 to 6|'7' in field 3"),
         ("RBE3,9,,1,123456,1.,123,2,3\n", "RBE3: its grid points do not determine all six"),
         ("RBAR,9,1,2,123,123456\n", "RBAR: its independent directions .* are not six"),
+        ("CONROD,9,1,2,1,1.\nCROD,8,1,1,2,7,1,2,3\n", "CROD: has '7' in field 6, behind its last"),
         ("GRID,9,,0.,0.,0.\n=,*1,=,*1.,==\n=4\n", r"= \(1, .* =4 \(1, .*: it repeats the card"),
     ],
 )  # fmt: skip
