@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from nldyn.base.errors import SystemModelError, check_frequency
+from nldyn.base.errors import SystemModelError, check_range
 from nldyn.system.loads import Excitation
 from nldyn.system.stop import Stop
 from nldyn.system.system import AnyDamper, AnySpring, System
@@ -56,11 +56,7 @@ class LoadCase:
     springs: tuple[AnySpring, ...] = ()
 
     def __post_init__(self) -> None:
-        low, high = self.range_hz
-        check_frequency("range_hz", low)
-        check_frequency("range_hz", high)
-        if not low < high:
-            raise SystemModelError(f"range_hz must run from low to high, got {self.range_hz}")
+        check_range(self.range_hz)
         if not self.excitation:
             raise SystemModelError("the setting has no excitation: nothing moves the structure")
 

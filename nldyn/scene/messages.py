@@ -248,9 +248,9 @@ def _unknown_key(model: type[BaseModel], key: KeyPath) -> str:
     if key[0] == "excitation" and name.startswith("frequency"):
         return f"is not a known key: {ORDERS}"
     known = list(here.model_fields) if here else []
-    laws = _bare(_walked(model, key[:-2])[1]) if len(key) > 2 else None
-    if _tagged(laws, key[-2:][0]) and any(name in t.model_fields for t in _tables_in(laws)):
-        return f"is not a key of law '{key[-2]}'"
+    law, laws = (key[-2], _bare(_walked(model, key[:-2])[1])) if len(key) > 2 else ("", None)
+    if _tagged(laws, law) and any(name in table.model_fields for table in _tables_in(laws)):
+        return f"is not a key of law '{law}'"
     guess = nearest(name, known)
     if guess:
         return f"is not a known key; did you mean '{guess}'?"

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from nldyn.base.errors import SystemModelError, check_frequency, check_types, shown
-from nldyn.system.values import check_finite
+from nldyn.system.values import check_finite, check_not_negative
 
 LARGEST_PHASE = 1e6  # in degrees: rounded to 1e-10 degrees
 
@@ -197,9 +197,7 @@ MOST_HARMONIC = 1000
 def _check_excitation(at: str, name: str, value: float, phase_deg: float, harmonic: int) -> None:
     check_types(**{"excitation: at": (at, str)})
     owner = f"excitation at '{at}'"
-    check_finite(owner, name, value)
-    if value < 0.0:
-        raise SystemModelError(f"{owner}: {name} must not be negative, got {value:g}")
+    check_not_negative(owner, name, value)
     check_finite(owner, "phase_deg", phase_deg)
     if abs(phase_deg) > LARGEST_PHASE:
         raise SystemModelError(

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, numbers, shown
-from nldyn.system.values import check_ends, check_finite, check_positive
+from nldyn.system.values import check_ends, check_finite, check_not_negative, check_positive
 
 LARGEST_DEGREE = 9
 DRAGS = ("speed", "displacement")
@@ -126,12 +126,7 @@ class Damper:
 
     def __post_init__(self) -> None:
         check_ends("damper", self.at, self.against)
-        owner = f"damper at '{self.at}'"
-        check_finite(owner, "coefficient", self.coefficient)
-        if self.coefficient < 0.0:
-            raise SystemModelError(
-                f"{owner}: coefficient must not be negative, got {self.coefficient:g}"
-            )
+        check_not_negative(f"damper at '{self.at}'", "coefficient", self.coefficient)
 
 
 @dataclass(frozen=True)

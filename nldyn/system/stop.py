@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from nldyn.base.arrays import TINY, Real
 from nldyn.base.errors import SystemModelError, check_types, shown
 from nldyn.system.contact_law import ContactLaw, check_law, power_law
-from nldyn.system.values import check_finite, check_positive, check_sides
+from nldyn.system.values import check_finite, check_not_negative, check_positive, check_sides
 
 LARGEST_EXPONENT = 4.0
 SMOOTH_TOUCH = 1.5  # exponent from which on multipliers have a slope at a touch
@@ -288,18 +288,11 @@ class Stop:
                 f"{owner}: exponent must lie in [1, {LARGEST_EXPONENT:g}], "
                 f"got {shown(self.exponent)}"
             )
-        check_finite(owner, "dissipation", self.dissipation)
-        if self.dissipation < 0.0:
-            raise SystemModelError(
-                f"{owner}: dissipation must not be negative, got {self.dissipation:g}"
-            )
-        check_finite(owner, "dashpot", self.dashpot)
-        if self.dashpot < 0.0:
-            raise SystemModelError(f"{owner}: dashpot must not be negative, got {self.dashpot:g}")
+        for name in ("dissipation", "dashpot"):
+            check_not_negative(owner, name, getattr(self, name))
+            if self.law is not None and getattr(self, name):
+                raise SystemModelError(f"{owner}: give either {name} or a law of your own")
         if self.law is not None:
-            for name in ("dissipation", "dashpot"):
-                if getattr(self, name):
-                    raise SystemModelError(f"{owner}: give either {name} or a law of your own")
             check_law(owner, self.law, self.stiffness, self.exponent)
         if not isinstance(self.pulls, bool | np.bool_):
             raise SystemModelError(f"{owner}: pulls must be True or False, got {shown(self.pulls)}")

@@ -23,6 +23,13 @@ def check_positive(owner: str, name: str, value: float) -> None:
         raise SystemModelError(f"{owner}: {name} must be positive, got {value:g}")
 
 
+def check_not_negative(owner: str, name: str, value: float) -> None:
+    """Refuse what is no finite number, or below zero."""
+    check_finite(owner, name, value)
+    if value < 0.0:
+        raise SystemModelError(f"{owner}: {name} must not be negative, got {value:g}")
+
+
 def check_ends(kind: str, at: object, against: object) -> None:
     """Refuse what names no interface, and one interface at both ends of an element."""
     check_types(**{f"{kind}: at": (at, str), f"{kind}: against": (against, str, None)})
