@@ -144,7 +144,7 @@ def run(work: Work, log: bool, as_json: bool, jobs: int) -> Told:
     from nldyn.io.checkpoint import CheckpointFile
     from nldyn.report.again import computed_before, drawn_of, read_summary
     from nldyn.report.results import write_results
-    from nldyn.scene.run import compute, explore_scene, parts_of_work, structure_of
+    from nldyn.scene.run import parts_of_work, results_of, structure_of
     from nldyn.search.exploration import Exploration
 
     scene, out = work.scene, work.out
@@ -154,8 +154,7 @@ def run(work: Work, log: bool, as_json: bool, jobs: int) -> Told:
     parts.end("model")
     before = None if work.replace else computed_before(out, scene, structure)
     given = scene, parts.part("branches"), CheckpointFile(work.unfinished), jobs, structure
-    follow = explore_scene if scene.explore else compute
-    found = before or work.found(lambda: follow(*given))
+    found = before or work.found(lambda: results_of(*given))
     if before is None or log:
         work.line("report", 0.0, 1.0)
         yscale: Literal["linear", "log"] = "log" if log else "linear"

@@ -115,20 +115,6 @@ def write_page(
     yscale : {"linear", "log"}
         Scale of the displacement axis at first.
     """
-    content = page_content(diagram, tables, summary, scene, surface, notes, yscale)
-    write_html(path, "page.html", content)
-
-
-def page_content(
-    diagram: Diagram,
-    tables: Mapping[str, Table],
-    summary: Mapping[str, Any],
-    scene: Scene | None = None,
-    surface: Mapping[str, Any] | None = None,
-    notes: Iterable[str] = (),
-    yscale: Literal["linear", "log"] = "linear",
-) -> dict[str, Any]:
-    """What the page shows, ready for JSON; the parameters are those of `write_page`."""
     branches = diagram.branches
     told = told_branches(diagram, tables)
     heights = [[node.orbit.max_abs_displacement for node in branch.nodes] for branch in told]
@@ -180,7 +166,7 @@ def page_content(
         for shown, each in zip(orbits, chosen, strict=True):
             if "fault" not in shown:
                 shown["motion"] = modal_motion(each.orbit)
-    return content
+    write_html(path, "page.html", content)
 
 
 def told_frequency(diagram: Diagram) -> str:

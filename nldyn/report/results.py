@@ -97,7 +97,7 @@ def write_results(
     Parameters
     ----------
     found : Diagram or Exploration
-        What `nldyn.scene.run.compute` or `nldyn.scene.run.explore_scene` gave.
+        What `nldyn.scene.run.results_of` gave.
     directory : str or Path
         New, empty, or written by an earlier run, whose files are replaced; other files in it
         are kept. Gets ``branches.csv``, ``special_points.csv``, ``ends.csv``, ``branches.h5``,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from nldyn.base.errors import SystemModelError
 from nldyn.branches.step_control import ContinuationOptions
@@ -15,7 +16,6 @@ from nldyn.scene.build import Structure, build_structure, build_system
 from nldyn.scene.checks import check_computable, check_held_to_follow, remarks
 from nldyn.scene.faults import told_as
 from nldyn.scene.followed import axis_of
-from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import ContinuationTable, Scene
 from nldyn.search.diagram import Diagram, SubharmonicSeed, diagram
 from nldyn.search.exploration import Exploration, ExploreOptions
@@ -79,50 +79,23 @@ def compute(
     >>> len(compute(scene).branches)     # without a stop there is only the resonance curve
     1
     """
-    if scene.explore is not None:
-        return explore_scene(scene, progress, checkpoint, jobs, structure).diagram
-    shares = parts_of_work(scene, progress, built=structure is not None)
-    structure = structure or structure_of(scene, shares.part("model"))
-    shares.end("model")
-    flow, table, axis = _to_follow(scene, structure)
-
-    with told_as(scene, ("continuation",), SystemModelError):
-        found = diagram(
-            flow,
-            axis.limits,
-            table.periods,
-            parameter=axis.parameter,
-            frequency_hz=axis.frequency_hz,
-            seeds=[SubharmonicSeed(seed.period, seed.place) for seed in scene.subharmonics],
-            search_points=table.search_points,
-            doublings=table.follow_doublings,
-            options=ContinuationOptions(max_step=table.max_step),
-            progress=shares.part("branches"),
-            checkpoint=checkpoint,
-            jobs=jobs,
-        )
-    return _remarked(scene, flow, found)
+    found = results_of(scene, progress, checkpoint, jobs, structure)
+    return found.diagram if isinstance(found, Exploration) else found
 
 
-def explore_scene(
+def results_of(
     scene: Scene,
     progress: Progress | None = None,
     checkpoint: CheckpointFile | None = None,
     jobs: int = 1,
     structure: Structure | None = None,
-) -> Exploration:
-    """Find the branches of a scene with an ``[explore]`` table, and tell how well it was searched.
+) -> Diagram | Exploration:
+    """The branches of a scene; with an ``[explore]`` table also how well they were searched.
 
     Parameters
     ----------
-    scene : Scene
-        A scene with an ``[[excitation]]``, a ``[continuation]`` and an ``[explore]``.
-    progress, checkpoint, jobs, structure
-        As for `nldyn.explore`.
-
-    Returns
-    -------
-    Exploration
+    scene, progress, checkpoint, jobs, structure
+        As for `compute`.
 
     Raises
     ------
@@ -148,31 +121,40 @@ def explore_scene(
     ... max_period = 2
     ... spacing = 0.1
     ... ''')
-    >>> explore_scene(scene).settled_share
+    >>> results_of(scene).settled_share
     1.0
     """
     shares = parts_of_work(scene, progress, built=structure is not None)
     structure = structure or structure_of(scene, shares.part("model"))
     shares.end("model")
     flow, table, axis = _to_follow(scene, structure)
-
-    if scene.explore is None:
-        raise scene_error(scene.file, ("explore",), "is missing")
-    efforts = scene.explore.model_dump()
-    with told_as(scene, ("explore",), SystemModelError):
-        found = explore(
+    given: dict[str, Any] = {
+        "parameter": axis.parameter,
+        "frequency_hz": axis.frequency_hz,
+        "options": ContinuationOptions(max_step=table.max_step),
+        "progress": shares.part("branches"),
+        "checkpoint": checkpoint,
+        "jobs": jobs,
+    }
+    if scene.explore is not None:
+        efforts = scene.explore.model_dump()
+        longest = efforts.pop("max_period")
+        with told_as(scene, ("explore",), SystemModelError):
+            searched = explore(
+                flow, axis.limits, longest, effort=ExploreOptions(**efforts), **given
+            )
+        return replace(searched, diagram=_remarked(scene, flow, searched.diagram))
+    with told_as(scene, ("continuation",), SystemModelError):
+        found = diagram(
             flow,
             axis.limits,
-            efforts.pop("max_period"),
-            parameter=axis.parameter,
-            frequency_hz=axis.frequency_hz,
-            effort=ExploreOptions(**efforts),
-            options=ContinuationOptions(max_step=table.max_step),
-            progress=shares.part("branches"),
-            checkpoint=checkpoint,
-            jobs=jobs,
+            table.periods,
+            seeds=[SubharmonicSeed(seed.period, seed.place) for seed in scene.subharmonics],
+            search_points=table.search_points,
+            doublings=table.follow_doublings,
+            **given,
         )
-    return replace(found, diagram=_remarked(scene, flow, found.diagram))
+    return _remarked(scene, flow, found)
 
 
 def structure_of(scene: Scene, progress: Progress | None = None) -> Structure:

@@ -136,7 +136,7 @@ def test_files_that_the_system_refuses_to_grow(scene, tmp_path):
 
 
 def test_a_folder_that_cannot_be_written_to_is_told_before_the_work(scene, tmp_path, monkeypatch):
-    monkeypatch.setattr("nldyn.scene.run.compute", lambda *_: pytest.fail("computed"))
+    monkeypatch.setattr("nldyn.scene.run.results_of", lambda *_: pytest.fail("computed"))
     (tmp_path / "closed").mkdir(mode=0o555)
     for place in (tmp_path / "closed" / "out", "/proc/out", tmp_path / ("x" * 300)):
         said = refusal(invoke(scene, place))

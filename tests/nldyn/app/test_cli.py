@@ -37,7 +37,7 @@ def computed(monkeypatch):
         progress("harmonic branch", 25.3, 0.5)
         return replace(diagram(), notes=("no 1/5 orbit found near 62.2 Hz",))
 
-    monkeypatch.setattr(nldyn.scene.run, "compute", compute)
+    monkeypatch.setattr(nldyn.scene.run, "results_of", compute)
 
 
 def test_run(tmp_path, computed):
@@ -79,7 +79,7 @@ def test_quiet_run_says_nothing_on_stderr(tmp_path, computed):
 
 
 def test_somebody_elses_directory_is_refused_before_the_work(tmp_path, monkeypatch):
-    monkeypatch.setattr(nldyn.scene.run, "compute", lambda *_: pytest.fail("computed"))
+    monkeypatch.setattr(nldyn.scene.run, "results_of", lambda *_: pytest.fail("computed"))
     (tmp_path / "mine.txt").write_text("")
     result = invoke("run", ONE_DOF, "--out", tmp_path)
     assert result.exit_code == 2
@@ -98,7 +98,7 @@ def stop_in_compiled_code(*_):
 
 @pytest.mark.parametrize("interrupt", [stop, stop_in_compiled_code])
 def test_ctrl_c(tmp_path, monkeypatch, interrupt):
-    monkeypatch.setattr(nldyn.scene.run, "compute", interrupt)
+    monkeypatch.setattr(nldyn.scene.run, "results_of", interrupt)
     result = invoke("run", ONE_DOF, "--out", tmp_path / "out", "--quiet")
     assert result.exit_code == 130
     assert result.stderr == "nldyn: stopped by Ctrl-C, nothing is written\n"

@@ -49,7 +49,7 @@ def test_new_lists_copies_and_overwrites_nothing(tmp_path, monkeypatch):
 
 
 def test_results_of_another_scene_are_not_replaced_without_a_word(tmp_path, monkeypatch):
-    monkeypatch.setattr(nldyn.scene.run, "compute", lambda *_: pytest.fail("computed"))
+    monkeypatch.setattr(nldyn.scene.run, "results_of", lambda *_: pytest.fail("computed"))
     out, scene = tmp_path / "out", tmp_path / "scene.toml"
     out.mkdir()
     (out / ".nldyn.json").write_text("{}")
