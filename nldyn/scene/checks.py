@@ -121,7 +121,7 @@ def check_structure_names(scene: Scene, mesh: TaggedStructure, file: Path) -> No
     assert scene.mesh is not None
     known = dict.fromkeys([*mesh.names, *(coupling.at for coupling in scene.couplings)])
     used = (*_points_used(scene), *_faces_used(scene))
-    what = f"a point or face of the mesh {scene.mesh.file} or of [[couplings]]"
+    what = f"a point or face of the mesh {scene.mesh.file}, of [places] or of [[couplings]]"
     _check_known(scene, mesh.groups, used, known, what, file)
 
 
