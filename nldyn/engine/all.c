@@ -1,8 +1,8 @@
 /* The engine as one unit, so that the compiler sees all of it. */
 #include "engine.h"
 
-#include "host.c"
 #include "linear.c"
+#include "host.c"
 #include "exponentials.c"
 #include "terms.c"
 #include "response.c"

@@ -106,13 +106,13 @@ typedef struct {
     int64_t m, n_fine, power;
     const double *chi;         /* (4, m) node times as fractions of the panel */
     const double *slope;       /* (4, m) dχ/ds */
-    const double *integrate;   /* (4, m, m) weight of node j in the integral up to node i */
+    const double *integrate;   /* (4, m, m) weight of node j in the integral up to node i, [j, i] */
     const double *weights;     /* (4, m) of the integral over the panel */
     const double *to_legendre; /* (m, m) */
     const double *ends_nodes;  /* (m + 2,) 0, the nodes, 1 */
     const double *barycentric; /* (m + 2,) */
     const double *fine_grid;   /* (n_fine,) */
-    const double *to_fine;     /* (n_fine, m + 2) */
+    const double *to_fine;     /* (m + 2, n_fine) */
 } Gauss;
 
 /* Pieces of a trajectory, see layout.py. used: pieces in use; the first of those of a motion
@@ -164,15 +164,16 @@ typedef struct {
     double *output;   /* (outputs, m) values at the nodes */
     double *F;        /* (na, m) forces */
     double *slope;    /* (outputs, m) derivative of the force with respect to the output */
-    double *to;       /* (outputs, m, 2n) row exp(A t_i) */
+    double *there;    /* (n, 4, m) exp(A t_i) */
+    double *to;       /* (outputs, 2n, m) row exp(A t_i) */
     double *back;     /* (na, 2n, m) exp(-A t_j) force */
-    double *G;        /* (outputs m, na m) outputs at the nodes per force at the nodes */
-    double *factors;  /* (na m, na m) of 1 + slope G, at these slopes or earlier ones */
-    int *order;       /* (na m,) its row swaps */
-    bool kept;        /* whether `factors` are worth keeping */
-    int made_kind;    /* kind and length for which to, back and G were filled */
+    double *G;        /* (na m, outputs m) outputs at the nodes per force at the nodes, by forces */
+    double *inverse;  /* (na m, na m) of 1 - slope G, at these slopes or earlier ones, see `invert` */
+    int *order;       /* (na m,) scratch for it */
+    bool kept;        /* whether it is worth keeping */
+    int made_kind;    /* kind and length for which there, to, back and G were filled */
     double made_length;
-    double *rise;     /* (na, m, 2n) row (exp(A t_i) - 1) of the penetrations */
+    double *rise;     /* (na, 2n, m) row (exp(A t_i) - 1) of the penetrations */
     /* (na,) penetration at the start and its rounding error, the same at the end: carried apart
      * from the state, in which rounding is a share of the displacement */
     double *depth, *doubt, *end_depth, *end_doubt;
@@ -183,8 +184,8 @@ typedef struct {
 
 /* Scratch of the functions that are named, sized once for each call. */
 typedef struct {
-    double *times, *waves, *product;                   /* panel_responses */
-    double *free, *new_slope, *solved, *step;          /* solve_panel */
+    double *times, *waves, *product;                   /* panel_responses, free_outputs */
+    double *free, *new_slope, *solved, *step, *led;    /* solve_panel */
     double *guess, *rounding, *noise, *inner, *values; /* contact_panel, first_event */
     double *fine, *driven;
     double *slopes, *forced, *swayed, *square;         /* resolved */

@@ -215,7 +215,7 @@ static Shown show_stop(const Motion *M, int kind, double phase, double h, int st
             end = at_end(tab, output) + gap;
         }
     } else {
-        node_outputs(fl, tab, kind, phase, M->w, h, panel, out, s->inner, s);
+        node_outputs(fl, tab, kind, phase, h, panel, out, s->inner, s);
         for (int i = 0; i < m; i++) s->inner[i] = gap - s->inner[i];
     }
     s->values[0] = sign * (start - gap);
@@ -234,7 +234,7 @@ static bool presses_in_vain(const Motion *M, int kind, double phase, double h, i
     Scratch *s = M->s;
     const Flow *fl = M->fl;
     int m = M->panel->m;
-    node_outputs(fl, M->tab, kind, phase, M->w, h, M->panel, stop, s->inner, s);
+    node_outputs(fl, M->tab, kind, phase, h, M->panel, stop, s->inner, s);
     for (int i = 0; i < m; i++) s->values[i + 1] = s->inner[i];
     s->values[0] = output_now(fl, stop, M->w, phase).value;
     s->values[m + 1] = output_now(fl, stop, M->w_end, phase + fl->omega * h).value;
@@ -248,6 +248,7 @@ static Event first_event(const Motion *M, int kind, double phase, double h)
     Scratch *s = M->s;
     Event found = {-1, 2.0, 2.0};
     int position = -1;
+    if (M->panel->na < fl->n_stops) drive_back(fl, M->tab, kind, M->w, h, M->panel, s);
     for (int stop = 0; stop < fl->n_stops; stop++) {
         if (M->closed[stop]) position++; /* a bond is always closed */
         if (is_bond(fl, stop)) continue;

@@ -102,14 +102,11 @@ static void series_expm1(double *x, int m)
     }
 }
 
-/* fill what `swung_there_and_back` needs at times (m,); the rate, or 0 for two decays */
-static double fill_swings(const double *block, const double *times, int m, double *decay,
-                          double *less, double *sine, double *cosine)
+/* fill what a swing needs at times (m,): e^{mean t}, that less 1, and sine and cosine of half its
+ * phase */
+static void fill_swings(double mean, double rate, const double *times, int m, double *decay,
+                        double *less, double *sine, double *cosine)
 {
-    double mean = 0.5 * (block[0] + block[3]), half = 0.5 * (block[0] - block[3]);
-    double square = half * half + block[1] * block[2];
-    if (square >= 0.0) return 0.0;
-    double rate = sqrt(-square);
     for (int i = 0; i < m; i++) {
         less[i] = mean * times[i]; /* for the time being */
         decay[i] = 0.5 * rate * times[i];
@@ -124,7 +121,38 @@ static double fill_swings(const double *block, const double *times, int m, doubl
             less[i] = expm1(less[i]);
         }
     }
-    return rate;
+}
+
+/* fill exp(block t) (4, m), exp(-block t) (4, m) and the diagonal of exp(block t) - 1 (2, m), to
+ * its own precision, at times (m,); waves (4, m) is scratch */
+static void fill_there_and_back(const double *block, const double *times, int m,
+                                double *restrict there, double *restrict back,
+                                double *restrict less, double *restrict waves)
+{
+    double mean = 0.5 * (block[0] + block[3]), half = 0.5 * (block[0] - block[3]);
+    double square = half * half + block[1] * block[2], rate = sqrt(fabs(square));
+    if (square < 0.0) {
+        double *w = waves;
+        fill_swings(mean, rate, times, m, w, w + m, w + 2 * m, w + 3 * m);
+        for (int i = 0; i < m; i++) {
+            ThereAndBack e = swung_there_and_back(block, rate, w[m + i], w[i], w[2 * m + i],
+                                                  w[3 * m + i]);
+            there[i] = e.there.a, there[m + i] = e.there.b;
+            there[2 * m + i] = e.there.c, there[3 * m + i] = e.there.d;
+            back[i] = e.back.a, back[m + i] = e.back.b;
+            back[2 * m + i] = e.back.c, back[3 * m + i] = e.back.d;
+            less[i] = e.less_a, less[m + i] = e.less_d;
+        }
+        return;
+    }
+    for (int i = 0; i < m; i++) {
+        ThereAndBack e = there_and_back(block, times[i]);
+        there[i] = e.there.a, there[m + i] = e.there.b;
+        there[2 * m + i] = e.there.c, there[3 * m + i] = e.there.d;
+        back[i] = e.back.a, back[m + i] = e.back.b;
+        back[2 * m + i] = e.back.c, back[3 * m + i] = e.back.d;
+        less[i] = e.less_a, less[m + i] = e.less_d;
+    }
 }
 
 /* advance a state (2n,) in place by a flight of duration t */

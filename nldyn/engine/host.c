@@ -47,15 +47,23 @@ static void multiply(const Watch *watch, const double *A, const double *B, doubl
                            C, &columns);
         return;
     }
-    for (int i = 0; i < rows; i++) {
-        double *c = C + (size_t)i * columns;
-        for (int j = 0; j < columns; j++) c[j] = 0.0;
-        for (int k = 0; k < inner; k++) {
-            double a = A[(size_t)i * inner + k];
-            const double *b = B + (size_t)k * columns;
-            for (int j = 0; j < columns; j++) c[j] += a * b[j];
-        }
+    for (int i = 0; i < rows; i++)
+        combine(C + (size_t)i * columns, NULL, columns, B, columns, A + (size_t)i * inner, 1,
+                inner);
+}
+
+/* C (rows, columns) = A^T B of A (inner, rows) and B (inner, columns) */
+static void multiply_transposed(const Watch *watch, const double *A, const double *B, double *C,
+                                int rows, int inner, int columns)
+{
+    if (watch->host->dgemm && inner >= LARGE && rows > 1) {
+        double one = 1.0, zero = 0.0;
+        watch->host->dgemm("N", "T", &columns, &rows, &inner, &one, B, &columns, A, &rows, &zero,
+                           C, &columns);
+        return;
     }
+    for (int i = 0; i < rows; i++)
+        combine(C + (size_t)i * columns, NULL, columns, B, columns, A + i, rows, inner);
 }
 
 /* whether the processor has all that the wider form of the library is compiled for */

@@ -94,6 +94,36 @@ static Force closed_law(const Flow *fl, int s, double delta, double speed)
     return (Force){dashpot * speed, 0.0, dashpot};
 }
 
+/* the same at m nodes; `speed` and `viscosity` are missing where no force depends on speeds */
+static void closed_laws(const Flow *fl, int s, int m, const double *delta, const double *speed,
+                        double *restrict force, double *restrict stiffness,
+                        double *restrict viscosity)
+{
+    const Stop *stop = stop_of(fl, s);
+    bool plain = fl->laws[s] == 0 && !is_rigid(fl, s) && !is_bond(fl, s) && !speed;
+    if (plain && stop->exponent == 1.0) {
+        for (int i = 0; i < m; i++) {
+            force[i] = stop->stiffness * delta[i];
+            stiffness[i] = stop->stiffness;
+        }
+        return;
+    }
+    if (plain && stop->exponent == 1.5) { /* several roots at once */
+        for (int i = 0; i < m; i++) {
+            double depth = larger(delta[i], 0.0), slope = stop->stiffness * sqrt(depth);
+            force[i] = slope * depth;
+            stiffness[i] = stop->exponent * slope;
+        }
+        return;
+    }
+    for (int i = 0; i < m; i++) {
+        Force f = closed_law(fl, s, delta[i], speed ? speed[i] : 0.0);
+        force[i] = f.force;
+        stiffness[i] = f.stiffness;
+        if (viscosity) viscosity[i] = f.viscosity;
+    }
+}
+
 /* whether a force depends on the speed of penetration, as far as one knows */
 static bool depends_on_speed(const Flow *fl, int s)
 {

@@ -106,7 +106,7 @@ static int shoot(Call *call)
     return OK;
 }
 
-/* fill the linear equations of a step: those of the segments, and the plane */
+/* fill the linear equations of a step, column by column: those of the segments, and the plane */
 static void fill_equations(Call *call)
 {
     const Task *task = call->task;
@@ -117,18 +117,17 @@ static void fill_equations(Call *call)
         int following = (s + 1) % k;
         for (int i = 0; i < size; i++) {
             int r = s * size + i;
-            double *row = matrix + (size_t)r * n;
             sides[2 * r] = task->point[following * size + i] - task->ends[r];
             sides[2 * r + 1] = 0.0;
-            row[following * size + i] -= 1.0;
+            matrix[(size_t)(following * size + i) * n + r] -= 1.0;
             for (int j = 0; j < size; j++)
-                row[s * size + j] += task->jacobians[(size_t)r * size + j];
-            row[n - 1] = call->omega * task->d_omegas[r];
+                matrix[(size_t)(s * size + j) * n + r] += task->jacobians[(size_t)r * size + j];
+            matrix[(size_t)(n - 1) * n + r] = call->omega * task->d_omegas[r];
         }
     }
-    double *plane = matrix + (size_t)(n - 1) * n, off = task->level;
+    double off = task->level;
     for (int j = 0; j < n; j++) {
-        plane[j] = task->row[j];
+        matrix[(size_t)j * n + n - 1] = task->row[j];
         off -= task->row[j] * task->point[j];
     }
     sides[2 * (n - 1)] = off;

@@ -22,6 +22,9 @@ static inline double smaller(double a, double b) { return b < a ? b : a; }
 
 static inline int64_t larger_index(int64_t a, int64_t b) { return b > a ? b : a; }
 
+/* of two numbers whose squares neither overflow nor matter where they vanish */
+static inline double length_of(double a, double b) { return sqrt(a * a + b * b); }
+
 static inline double squared(double x) { return x * x; }
 
 static inline double cubed(double x) { return x * x * x; }

@@ -12,7 +12,8 @@
 #define SETTLED 1e-10 /* of the largest force: its difference from that of its own penetration */
 #define SOLVED 1e-13  /* relative change of the penetrations that Newton's method would still make */
 #define SLOWEST 1e-3  /* 1 - rate of its convergence, at least, in the estimate of that */
-#define STALE 0.1     /* rate from which its matrix is factored anew */
+#define LARGEST_ANGLE 1e5 /* that `fill_sines` is left to */
+#define STALE 0.1     /* rate from which its matrix is inverted anew */
 
 /* make the panel an empty one for some closed stops */
 static void renew_panel(const Flow *fl, Panel *panel, const int *active, int na)
@@ -53,28 +54,30 @@ static double between(const Flow *fl, int stop, int other)
     return mobility;
 }
 
-/* fill the columns of a block in to, rise and back at node i */
-static void fill_block_responses(const Flow *fl, Panel *panel, int b, int i, const ThereAndBack *e)
+/* fill the rows of a block in to, rise and back, by its exponentials: there (4, m), back (4, m) and
+ * the diagonal of exp(A t) - 1 (2, m) */
+static void fill_block_responses(const Flow *fl, Panel *panel, int b, const double *there,
+                                 const double *back, const double *less)
 {
     int na = panel->na, m = panel->m, size = fl->size, j = 2 * b;
-    Square there = e->there, back = e->back;
     for (int o = 0; o < panel->outputs; o++) {
         int stop = panel->active[o % na];
         const double *row = row_of(fl, output_order(fl, stop, o / na), stop);
-        double x = row[j], y = row[j + 1], *to = panel->to + ((size_t)o * m + i) * size + j;
-        to[0] = x * there.a + y * there.c;
-        to[1] = x * there.b + y * there.d;
-        if (o < na) {
-            double *rise = panel->rise + ((size_t)o * m + i) * size + j;
-            rise[0] = x * e->less_a + y * there.c;
-            rise[1] = x * there.b + y * e->less_d;
-        }
+        double x = row[j], y = row[j + 1];
+        double *restrict to = panel->to + ((size_t)o * size + j) * m;
+        for (int i = 0; i < m; i++) to[i] = x * there[i] + y * there[2 * m + i];
+        for (int i = 0; i < m; i++) to[m + i] = x * there[m + i] + y * there[3 * m + i];
+        if (o >= na) continue;
+        double *restrict rise = panel->rise + ((size_t)o * size + j) * m;
+        for (int i = 0; i < m; i++) rise[i] = x * less[i] + y * there[2 * m + i];
+        for (int i = 0; i < m; i++) rise[m + i] = x * there[m + i] + y * less[m + i];
     }
     for (int a = 0; a < na; a++) {
         const double *push = push_of(fl, panel->active[a]) + j;
-        double *into = panel->back + ((size_t)a * size + j) * m + i;
-        into[0] = back.a * push[0] + back.b * push[1];
-        into[m] = back.c * push[0] + back.d * push[1];
+        double x = push[0], y = push[1];
+        double *restrict into = panel->back + ((size_t)a * size + j) * m;
+        for (int i = 0; i < m; i++) into[i] = back[i] * x + back[m + i] * y;
+        for (int i = 0; i < m; i++) into[m + i] = back[2 * m + i] * x + back[3 * m + i] * y;
     }
 }
 
@@ -82,24 +85,24 @@ static void fill_block_responses(const Flow *fl, Panel *panel, int b, int i, con
 static void fill_influences(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel,
                             Scratch *s)
 {
-    int na = panel->na, m = panel->m, width = na * m;
-    const double *integrate = tab->integrate + (size_t)kind * m * m;
+    int na = panel->na, m = panel->m, height = panel->outputs * m;
+    const double *integrate = tab->integrate + (size_t)kind * m * m, *product = s->product;
     for (int o = 0; o < panel->outputs; o++)
         for (int a = 0; a < na; a++) {
-            multiply(fl->watch, panel->to + (size_t)o * m * fl->size,
-                     panel->back + (size_t)a * fl->size * m, s->product, m, fl->size, m);
-            double *G = panel->G + (size_t)o * m * width + a * m;
-            for (int i = 0; i < m; i++)
-                for (int j = 0; j < m; j++)
-                    G[(size_t)i * width + j] = h * integrate[i * m + j] * s->product[i * m + j];
+            multiply_transposed(fl->watch, panel->back + (size_t)a * fl->size * m,
+                                panel->to + (size_t)o * fl->size * m, s->product, m, fl->size, m);
+            double *restrict G = panel->G + (size_t)a * m * height + o * m;
+            for (int j = 0; j < m; j++)
+                for (int i = 0; i < m; i++)
+                    G[(size_t)j * height + i] = -h * integrate[j * m + i] * product[j * m + i];
             if (o < na && a != o && is_rigid(fl, panel->active[o])) { /* what acts at once */
                 double kick = between(fl, panel->active[o], panel->active[a]);
-                for (int i = 0; i < m; i++) G[(size_t)i * width + i] += kick;
+                for (int i = 0; i < m; i++) G[(size_t)i * height + i] -= kick;
             }
         }
 }
 
-/* fill what a panel of length h needs to know of the linear part: to, rise, back and G */
+/* fill what a panel of length h needs to know of the linear part: there, to, rise, back and G */
 static void panel_responses(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel,
                             Scratch *s)
 {
@@ -107,57 +110,82 @@ static void panel_responses(const Flow *fl, const Gauss *tab, int kind, double h
     if (panel->made_kind == kind && panel->made_length == h) return;
     panel->made_kind = kind;
     panel->made_length = h;
-    double *decay = s->waves, *less = decay + m, *sine = less + m, *cosine = sine + m;
+    double *back = s->waves + 4 * m, *less = back + 4 * m;
     for (int i = 0; i < m; i++) s->times[i] = h * tab->chi[kind * m + i];
     for (int b = 0; b < fl->n; b++) {
-        const double *block = block_of(fl, b);
-        double rate = fill_swings(block, s->times, m, decay, less, sine, cosine);
-        for (int i = 0; i < m; i++) {
-            ThereAndBack e = rate > 0.0 ? swung_there_and_back(block, rate, less[i], decay[i],
-                                                               sine[i], cosine[i])
-                                        : there_and_back(block, s->times[i]);
-            fill_block_responses(fl, panel, b, i, &e);
-        }
+        double *there = panel->there + (size_t)4 * b * m;
+        fill_there_and_back(block_of(fl, b), s->times, m, there, back, less, s->waves);
+        fill_block_responses(fl, panel, b, there, back, less);
     }
     fill_influences(fl, tab, kind, h, panel, s);
+}
+
+/* fill how a complex number of length one has turned, from a phase on, at the nodes of a panel, to
+ * its own precision: real and imaginary parts (2, m); angles (m,) is scratch */
+static void fill_turns(const Gauss *tab, int kind, double phase, double angle, double *angles,
+                       double *restrict turns)
+{
+    int m = (int)tab->m;
+    const double *chi = tab->chi + (size_t)kind * m;
+    Complex start = turned(phase);
+    double *restrict sine = turns, *restrict cosine = turns + m;
+    for (int i = 0; i < m; i++) angles[i] = 0.5 * angle * chi[i];
+    if (angle < LARGEST_ANGLE)
+        fill_sines(angles, sine, cosine, m);
+    else
+        for (int i = 0; i < m; i++) {
+            sine[i] = sin(angles[i]);
+            cosine[i] = cos(angles[i]);
+        }
+    for (int i = 0; i < m; i++) { /* the start times e^{2i angle} - 1 */
+        double re = -2.0 * sine[i] * sine[i], im = 2.0 * sine[i] * cosine[i];
+        turns[i] = start.re * re - start.im * im;
+        turns[m + i] = start.re * im + start.im * re;
+    }
+}
+
+/* fill an output (m,) without contact forces at the nodes, see `free_outputs`; forced (m,) is
+ * scratch */
+static void free_output_at_nodes(const Flow *fl, double phase, const double *w, double h,
+                                 const Panel *panel, int o, const double *chi, const double *turns,
+                                 double *forced, double *free)
+{
+    int na = panel->na, m = panel->m, size = fl->size, stop = panel->active[o % na];
+    int order = output_order(fl, stop, o / na);
+    double omega = fl->omega;
+    Complex steady = forced_of(fl, 0, 0, stop), start = turned(phase);
+    const double *rows = (order == 0 ? panel->rise : panel->to) + (size_t)o * size * m;
+    for (int i = 0; i < m; i++) {
+        Complex swing = complex_of(turns[i], turns[m + i]), turn = sum(start, swing);
+        if (order == 0)
+            forced[i] = panel->depth[o] + product(steady, swing).re;
+        else if (order == 1)
+            forced[i] = -omega * product(steady, turn).im;
+        else
+            forced[i] = -omega * omega * product(steady, turn).re;
+    }
+    combine(free, forced, m, rows, m, w, 1, size);
+    for (int i = 0; i < m && fl->n_terms > 0; i++) {
+        double t = h * chi[i];
+        if (order == 0) {
+            free[i] += swollen(fl, stop, phase, t);
+        } else {
+            Course more = swelling(fl, stop, phase + omega * t);
+            free[i] += order == 1 ? more.first : more.second;
+        }
+    }
 }
 
 /* fill the panel's outputs at the nodes (outputs m,) without contact forces; penetrations are what
  * they were at the start of the panel, and their changes */
 static void free_outputs(const Flow *fl, const Gauss *tab, int kind, double phase, const double *w,
-                         double h, const Panel *panel, double *free)
+                         double h, const Panel *panel, Scratch *s)
 {
-    int na = panel->na, m = panel->m, size = fl->size;
-    double omega = fl->omega;
-    Complex start = turned(phase);
-    for (int i = 0; i < m; i++) {
-        double t = h * tab->chi[kind * m + i];
-        Complex swing = swung(start, omega * t), turn = sum(start, swing);
-        for (int o = 0; o < panel->outputs; o++) {
-            int stop = panel->active[o % na], order = output_order(fl, stop, o / na);
-            Complex steady = forced_of(fl, 0, 0, stop);
-            double value;
-            const double *row = panel->to + ((size_t)o * m + i) * size;
-            if (order == 2) {
-                value = -omega * omega * product(steady, turn).re;
-            } else if (order == 0) {
-                value = panel->depth[o] + product(steady, swing).re;
-                row = panel->rise + ((size_t)o * m + i) * size;
-            } else {
-                value = -omega * product(steady, turn).im;
-            }
-            for (int k = 0; k < size; k++) value += row[k] * w[k];
-            if (fl->n_terms > 0) {
-                if (order == 0) {
-                    value += swollen(fl, stop, phase, t);
-                } else {
-                    Course more = swelling(fl, stop, phase + omega * t);
-                    value += order == 1 ? more.first : more.second;
-                }
-            }
-            free[o * m + i] = value;
-        }
-    }
+    int m = panel->m;
+    fill_turns(tab, kind, phase, fl->omega * h, s->times, s->waves);
+    for (int o = 0; o < panel->outputs; o++)
+        free_output_at_nodes(fl, phase, w, h, panel, o, tab->chi + (size_t)kind * m, s->waves,
+                             s->step, s->free + (size_t)o * m);
 }
 
 /* fill F from the outputs at the nodes, and its derivatives into `slope` */
@@ -165,42 +193,39 @@ static void panel_forces(const Flow *fl, Panel *panel, double *slope)
 {
     int na = panel->na, m = panel->m;
     bool rates = panel->outputs > na;
-    for (int a = 0; a < na; a++)
-        for (int i = 0; i < m; i++) {
-            double speed = rates ? panel->output[(na + a) * m + i] : 0.0;
-            Force f = closed_law(fl, panel->active[a], panel->output[a * m + i], speed);
-            panel->F[a * m + i] = f.force;
-            slope[a * m + i] = f.stiffness;
-            if (rates) slope[(na + a) * m + i] = f.viscosity;
-        }
-}
-
-/* factor the matrix 1 + slope G */
-static void factor_panel(Panel *panel)
-{
-    int width = panel->na * panel->m;
-    for (int p = 0; p < width; p++) {
-        double *row = panel->factors + (size_t)p * width;
-        const double *G = panel->G + (size_t)p * width;
-        for (int q = 0; q < width; q++) row[q] = panel->slope[p] * G[q];
-        if (panel->outputs > panel->na) {
-            const double *rates = panel->G + (size_t)(width + p) * width;
-            for (int q = 0; q < width; q++) row[q] += panel->slope[width + p] * rates[q];
-        }
-        row[p] += 1.0;
+    for (int a = 0; a < na; a++) {
+        const double *delta = panel->output + (size_t)a * m;
+        const double *speed = rates ? panel->output + (size_t)(na + a) * m : NULL;
+        double *viscosity = rates ? slope + (size_t)(na + a) * m : NULL;
+        closed_laws(fl, panel->active[a], m, delta, speed, panel->F + (size_t)a * m,
+                    slope + (size_t)a * m, viscosity);
     }
-    lu_factor(panel->factors, width, panel->order);
 }
 
-/* output p at its node: what is free minus what the forces (na m,) take away */
-static inline double less_forced(const Panel *panel, const double *free, const double *force,
-                                 int p)
+/* fill the inverse of the matrix 1 - slope G */
+static void invert_panel(Panel *panel)
 {
-    int width = panel->na * panel->m;
-    double total = free[p];
-    const double *G = panel->G + (size_t)p * width;
-    for (int q = 0; q < width; q++) total -= G[q] * force[q];
-    return total;
+    int width = panel->na * panel->m, height = panel->outputs * panel->m, pad = padded(width);
+    const double *slope = panel->slope, *rates = slope + width;
+    for (int q = 0; q < width; q++) {
+        double *restrict column = panel->inverse + (size_t)q * pad;
+        const double *G = panel->G + (size_t)q * height;
+        for (int p = 0; p < width; p++) column[p] = -slope[p] * G[p];
+        if (height > width)
+            for (int p = 0; p < width; p++) column[p] -= rates[p] * G[width + p];
+        column[q] += 1.0;
+        for (int p = width; p < pad; p++) column[p] = 0.0;
+    }
+    invert(panel->inverse, width, panel->order);
+}
+
+/* fill the outputs at the nodes from one on: what is free and what the forces (na m,) add */
+static void with_forces(const Panel *panel, const double *free, const double *force, int first,
+                        double *output)
+{
+    int width = panel->na * panel->m, height = panel->outputs * panel->m;
+    combine(output + first, free + first, height - first, panel->G + first, height, force, 1,
+            width);
 }
 
 /* fill the rates of the outputs with what the guessed penetrations lead to without them */
@@ -209,20 +234,18 @@ static void guess_rates(const Flow *fl, Panel *panel, Scratch *s)
     int width = panel->na * panel->m, count = panel->outputs * panel->m;
     for (int p = width; p < count; p++) panel->output[p] = 0.0;
     panel_forces(fl, panel, s->new_slope);
-    for (int p = 0; p < width; p++) s->solved[p] = panel->F[p];
-    for (int p = width; p < count; p++)
-        panel->output[p] = less_forced(panel, s->free, s->solved, p);
+    with_forces(panel, s->free, panel->F, width, panel->output);
 }
 
 /* rounding error of stop a's force at node i by what all forces (na m,) have moved so far */
 static double rounded_force(const Panel *panel, const double *force, int a, int i)
 {
-    int width = panel->na * panel->m;
+    int width = panel->na * panel->m, height = panel->outputs * panel->m;
     double error = 0.0;
     for (int o = a; o < panel->outputs; o += panel->na) {
         double moved = 0.0;
-        const double *G = panel->G + (size_t)(o * panel->m + i) * width;
-        for (int p = 0; p < width; p++) moved += fabs(G[p] * force[p]);
+        const double *G = panel->G + o * panel->m + i;
+        for (int p = 0; p < width; p++) moved += fabs(G[(size_t)p * height] * force[p]);
         error += SUM_ROUNDING * moved * fabs(panel->slope[o * panel->m + i]);
     }
     return error;
@@ -256,13 +279,16 @@ static void step_forces(Panel *panel, Scratch *s, int iteration)
             s->step[p] = 0.0;
         }
     }
-    if (iteration == 0) /* the guess is not what its forces lead to */
-        for (int p = 0; p < panel->outputs * panel->m; p++) {
-            double off = less_forced(panel, s->free, s->solved, p) - panel->output[p];
-            s->step[p % width] += panel->slope[p] * off;
-        }
-    lu_apply_vector(panel->factors, width, panel->order, s->step);
-    for (int p = 0; p < width; p++) s->solved[p] += s->step[p];
+    if (iteration == 0) { /* the guess is not what its forces lead to */
+        with_forces(panel, s->free, s->solved, 0, s->led);
+        for (int o = 0; o < panel->outputs; o += panel->na)
+            for (int p = 0; p < width; p++) {
+                int place = o * panel->m + p;
+                s->step[p] += panel->slope[place] * (s->led[place] - panel->output[place]);
+            }
+    }
+    combine(s->led, s->solved, width, panel->inverse, padded(width), s->step, 1, width);
+    memcpy(s->solved, s->led, sizeof(double) * width);
 }
 
 /* put the outputs that the forces lead to in their place; their largest relative change beyond
@@ -271,11 +297,12 @@ static double renew_outputs(Panel *panel, const Scratch *s, const double *noise)
 {
     int m = panel->m;
     double change = 0.0;
+    with_forces(panel, s->free, s->solved, 0, s->led);
     for (int o = 0; o < panel->outputs; o++) {
         double scale = 0.0, longest = 0.0, total = 0.0;
         for (int i = 0; i < m; i++) {
             double *output = panel->output + o * m + i;
-            double value = less_forced(panel, s->free, s->solved, o * m + i);
+            double value = s->led[o * m + i];
             scale = larger(scale, fabs(*output));
             longest = larger(longest, fabs(value - *output));
             total += value;
@@ -290,14 +317,14 @@ static double renew_outputs(Panel *panel, const Scratch *s, const double *noise)
 /* Newton's method for the forces at the nodes; the penetrations in `output` are the guess.
  *
  * noise (outputs,) is the rounding error to expect in each output. Returns whether it converged,
- * with the panel filled. The factors of its matrix serve as long as they bring an error down
- * tenfold per step, also those that the call before has left. */
+ * with the panel filled. The inverse of its matrix serves as long as it brings an error down
+ * tenfold per step, also that which the call before has left. */
 static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase, const double *w,
                         double h, const double *noise, Panel *panel, Scratch *s)
 {
     int count = panel->outputs * panel->m;
     panel_responses(fl, tab, kind, h, panel, s);
-    free_outputs(fl, tab, kind, phase, w, h, panel, s->free);
+    free_outputs(fl, tab, kind, phase, w, h, panel, s);
     if (panel->outputs > panel->na) guess_rates(fl, panel, s);
     double before = INFINITY;
     for (int iteration = 0; iteration < 60; iteration++) {
@@ -305,7 +332,7 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
         bool fresh = !panel->kept;
         if (fresh) {
             for (int p = 0; p < count; p++) panel->slope[p] = s->new_slope[p];
-            factor_panel(panel);
+            invert_panel(panel);
             panel->kept = true;
         }
         step_forces(panel, s, iteration);

@@ -17,7 +17,7 @@ static void factor_holding(const Flow *fl, double h, const Panel *panel, Scratch
     for (int a = 0; a < na; a++)
         for (int b = 0; b < na; b++) {
             double mobility = between(fl, panel->active[a], panel->active[b]);
-            s->hold_matrix[a * na + b] = (a == b) + h * s->viscosity[a] * mobility;
+            s->hold_matrix[b * na + a] = (a == b) + h * s->viscosity[a] * mobility;
         }
     lu_factor(s->hold_matrix, na, s->hold_order);
 }
@@ -71,12 +71,14 @@ static void panel_end(const Flow *fl, const Gauss *tab, int kind, double phase, 
 {
     int na = panel->na, m = panel->m;
     for (int a = 0; a < na; a++) panel->end_depth[a] = panel->depth[a];
+    for (int a = 0; a < na; a++)
+        for (int j = 0; j < m; j++)
+            s->step[a * m + j] = h * tab->weights[kind * m + j] * panel->F[a * m + j];
     for (int k = 0; k < fl->size; k++) {
         double kick = 0.0; /* what the forces have added, taken back to the start */
         for (int a = 0; a < na; a++) {
             const double *back = panel->back + ((size_t)a * fl->size + k) * m;
-            for (int j = 0; j < m; j++)
-                kick -= h * tab->weights[kind * m + j] * panel->F[a * m + j] * back[j];
+            for (int j = 0; j < m; j++) kick -= s->step[a * m + j] * back[j];
         }
         w_end[k] = w[k] + kick;
         for (int a = 0; a < na; a++)
@@ -115,8 +117,8 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
     int na = panel->na, m = panel->m, width = na * m;
     memset(s->forces, 0, sizeof(double) * width * n_columns);
     for (int o = 0; o < panel->outputs; o++) {
-        multiply(fl->watch, panel->to + (size_t)o * m * fl->size, columns, s->part, m, fl->size,
-                 n_columns);
+        multiply_transposed(fl->watch, panel->to + (size_t)o * m * fl->size, columns, s->part, m,
+                            fl->size, n_columns);
         for (int i = 0; i < m; i++) {
             double *forces = s->forces + (size_t)((o % na) * m + i) * n_columns;
             double slope = panel->slope[o * m + i], t = h * tab->chi[kind * m + i];
@@ -124,13 +126,14 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
             add_node_columns(fl, phase + fl->omega * t, t0 + t, panel, o, i, n_columns, forces);
         }
     }
-    factor_panel(panel);
-    lu_apply(panel->factors, width, panel->order, s->forces, n_columns);
+    invert_panel(panel);
     for (int a = 0; a < na; a++) {
-        for (int j = 0; j < m; j++)
-            for (int c = 0; c < n_columns; c++)
-                s->part[j * n_columns + c] =
-                    h * tab->weights[kind * m + j] * s->forces[(size_t)(a * m + j) * n_columns + c];
+        for (int j = 0; j < m; j++) {
+            double *part = s->part + (size_t)j * n_columns, weight = h * tab->weights[kind * m + j];
+            combine(part, NULL, n_columns, s->forces, n_columns, panel->inverse + a * m + j,
+                    padded(width), width);
+            for (int c = 0; c < n_columns; c++) part[c] *= weight;
+        }
         multiply(fl->watch, panel->back + (size_t)a * fl->size * m, s->part, s->change, fl->size,
                  m, n_columns);
         for (int k = 0; k < fl->size * n_columns; k++) columns[k] -= s->change[k];
@@ -138,23 +141,38 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
     fly_columns(fl->blocks, fl->n, columns, n_columns, h);
 }
 
-/* fill an output at the nodes of a panel, (m,), with the forces at work */
-static void node_outputs(const Flow *fl, const Gauss *tab, int kind, double phase, const double *w,
-                         double h, const Panel *panel, int out, double *values, Scratch *s)
+/* fill `driven` (2n, m): the states at the nodes of a panel, taken back to its start */
+static void drive_back(const Flow *fl, const Gauss *tab, int kind, const double *w, double h,
+                       const Panel *panel, Scratch *s)
 {
     int m = panel->m;
     const double *integrate = tab->integrate + (size_t)kind * m * m;
-    for (int i = 0; i < m; i++) {
-        double t = h * tab->chi[kind * m + i];
-        for (int k = 0; k < fl->size; k++) {
-            s->driven[k] = w[k];
-            for (int a = 0; a < panel->na; a++) {
-                const double *back = panel->back + ((size_t)a * fl->size + k) * m;
-                for (int j = 0; j < m; j++)
-                    s->driven[k] -= h * integrate[i * m + j] * panel->F[a * m + j] * back[j];
+    for (int k = 0; k < fl->size; k++) {
+        double *driven = s->driven + (size_t)k * m;
+        for (int i = 0; i < m; i++) driven[i] = w[k];
+        for (int a = 0; a < panel->na; a++) {
+            const double *back = panel->back + ((size_t)a * fl->size + k) * m;
+            const double *F = panel->F + (size_t)a * m;
+            for (int j = 0; j < m; j++) {
+                double impulse = h * F[j] * back[j];
+                for (int i = 0; i < m; i++) driven[i] -= integrate[j * m + i] * impulse;
             }
         }
-        values[i] = free_output(fl, out, s->driven, t) +
-                    forced_output(fl, out, phase + fl->omega * t);
+    }
+}
+
+/* fill an output at the nodes of a panel, (m,), with the forces at work; s->driven is filled */
+static void node_outputs(const Flow *fl, const Gauss *tab, int kind, double phase, double h,
+                         const Panel *panel, int out, double *values, const Scratch *s)
+{
+    int m = panel->m;
+    const double *row = row_of(fl, 0, out);
+    for (int i = 0; i < m; i++)
+        values[i] = forced_output(fl, out, phase + fl->omega * h * tab->chi[kind * m + i]);
+    for (int b = 0; b < fl->n; b++) {
+        const double *e = panel->there + (size_t)4 * b * m, *x = s->driven + (size_t)2 * b * m;
+        for (int i = 0; i < m; i++)
+            values[i] += row[2 * b] * (e[i] * x[i] + e[m + i] * x[m + i]) +
+                         row[2 * b + 1] * (e[2 * m + i] * x[i] + e[3 * m + i] * x[m + i]);
     }
 }

@@ -259,12 +259,8 @@ static Value minimum_beside(const Gauss *tab, const double *values, const double
 /* fill the polynomial through `values` on a grid four times as fine as the nodes */
 static void refine(const Gauss *tab, const double *values, double *fine)
 {
-    int count = (int)tab->m + 2;
-    for (int i = 0; i < tab->n_fine; i++) {
-        double total = 0.0;
-        for (int j = 0; j < count; j++) total += tab->to_fine[(size_t)i * count + j] * values[j];
-        fine[i] = total;
-    }
+    int n = (int)tab->n_fine;
+    combine(fine, NULL, n, tab->to_fine, n, values, 1, (int)tab->m + 2);
 }
 
 /* where a polynomial that is `above` at `low` and negative at `high` changes its sign */

@@ -33,7 +33,7 @@ static void factor_mobilities(const Motion *M, int n)
     Scratch *s = M->s;
     for (int a = 0; a < n; a++)
         for (int b = 0; b < n; b++)
-            s->mobility[a * n + b] = between(M->fl, s->resting[a], s->resting[b]);
+            s->mobility[b * n + a] = between(M->fl, s->resting[a], s->resting[b]);
     lu_factor(s->mobility, n, s->mobility_order);
 }
 

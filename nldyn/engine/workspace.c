@@ -58,10 +58,11 @@ static void lay_out_panel(Block *block, const Flow *fl, int m, Panel *panel)
     panel->output = numbers(block, outputs);
     panel->F = numbers(block, nodes);
     panel->slope = numbers(block, outputs);
+    panel->there = numbers(block, 2 * size * m);
     panel->to = numbers(block, outputs * size);
     panel->back = numbers(block, nodes * size);
     panel->G = numbers(block, outputs * nodes);
-    panel->factors = numbers(block, nodes * nodes);
+    panel->inverse = numbers(block, nodes * padded((int)nodes));
     panel->order = indices(block, nodes);
     panel->rise = numbers(block, nodes * size);
     panel->depth = numbers(block, na);
@@ -76,19 +77,20 @@ static void lay_out_contacts(Block *block, const Flow *fl, const Gauss *tab, Scr
 {
     size_t m = tab->m, na = fl->n_stops, nodes = na * m, size = fl->size;
     s->times = numbers(block, m);
-    s->waves = numbers(block, 4 * m);
+    s->waves = numbers(block, 10 * m);
     s->product = numbers(block, m * m);
     s->free = numbers(block, 2 * nodes);
     s->new_slope = numbers(block, 2 * nodes);
     s->solved = numbers(block, nodes);
     s->step = numbers(block, nodes);
+    s->led = numbers(block, 2 * nodes);
     s->guess = numbers(block, m);
     s->rounding = numbers(block, 2 * na);
     s->noise = numbers(block, 2 * na);
     s->inner = numbers(block, m);
     s->values = numbers(block, m + 2);
     s->fine = numbers(block, tab->n_fine);
-    s->driven = numbers(block, size);
+    s->driven = numbers(block, size * m);
     s->slopes = numbers(block, 2 * nodes);
     s->forced = numbers(block, na);
     s->swayed = numbers(block, na);

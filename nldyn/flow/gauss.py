@@ -59,9 +59,9 @@ class GaussTables(NamedTuple):
     def packed(self) -> Packed:
         """The tables as the engine reads them."""
         return Packed(
-            self.nodes.size, self.fine_grid.size, self.power, self.chi, self.slope, self.integrate,
-            self.weights, self.to_legendre, self.ends_nodes, self.barycentric, self.fine_grid,
-            self.to_fine,
+            self.nodes.size, self.fine_grid.size, self.power, self.chi, self.slope,
+            self.integrate.transpose(0, 2, 1), self.weights, self.to_legendre, self.ends_nodes,
+            self.barycentric, self.fine_grid, self.to_fine.T,
         )  # fmt: skip
 
 
