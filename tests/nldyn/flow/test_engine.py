@@ -150,7 +150,10 @@ def laws(tmp_path_factory):
 
 def test_a_law_of_c_gives_the_orbits_of_the_same_law_here(laws):
     law = CompiledLaw(laws, "hertz")
-    own, usual = (solve_orbit(rattling(**given), 12.0) for given in ({"law": law}, {}))
+    usual = solve_orbit(rattling(), 12.0)
+    flow = usual.problem.flow  # from rest, last digits decide which of several orbits is found
+    guess = flow.to_modal(usual.problem.nodes(usual.point)[0])
+    own = solve_orbit(rattling(law=law), 12.0, guess=guess)
     np.testing.assert_allclose(own.multipliers, usual.multipliers, rtol=1e-9, atol=1e-12)
     assert pickle.loads(pickle.dumps(law)) == law
 
