@@ -36,7 +36,7 @@ from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.shooting import ShootingProblem
 from nldyn.search.diagram import Diagram
 from nldyn.search.exploration import Coverage, Exploration, ExploreOptions, Question, Stage
-from nldyn.system.chart import NAMES, THE_FREQUENCY, Chart, checked_parameter, unit_of
+from nldyn.system.chart import NAMES, THE_FREQUENCY, Chart, OwnParameter, checked_parameter, unit_of
 from nldyn.system.parameters import Parameter
 
 FORMAT = "nldyn branches"
@@ -76,9 +76,19 @@ def _of_diagram(diagram: Diagram) -> dict[str, Any]:
     about["notes"] = diagram.notes
     if diagram.frequency_hz is not None:
         about["frequency_hz"] = diagram.frequency_hz
+    _check_written(diagram.parameter)
     if diagram.parameter != THE_FREQUENCY:
         about |= {"parameter": diagram.parameter.name, "index": diagram.parameter.index}
     return about
+
+
+def _check_written(parameter: Parameter) -> None:
+    """Refuse what a file cannot hold."""
+    if isinstance(parameter, OwnParameter):
+        raise SystemModelError(
+            f"parameter '{parameter.name}' is a function of your own, which a file does not hold: "
+            "keep the table() of its branches"
+        )
 
 
 def _is_diagram(root: Group) -> bool:
@@ -162,6 +172,7 @@ def _write_branch(group: Any, branch: Branch, flows: list[FlowMap]) -> None:
     number = _number_of(problem.flow, flows)
     chart = family.charts[0]
     if not family.in_frequency_alone:
+        _check_written(chart.parameter)
         part = group.create_group("parameter")
         for key in ("name", "index"):
             set_attribute(part, key, getattr(chart.parameter, key))

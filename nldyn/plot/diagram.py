@@ -298,7 +298,8 @@ def followed(branches: Sequence[Branch]) -> Along:
         raise SystemModelError(f"the branches were followed in different parameters: {names}")
     if parameters in ([], [THE_FREQUENCY]):
         return Along(THE_FREQUENCY)
-    return Along.of(parameters[0], max(float(np.abs(each.values).max()) for each in branches))
+    largest = max(float(np.abs(each.values).max()) for each in branches)
+    return Along.of(parameters[0], largest, branches[0].nodes[0].orbit.system)
 
 
 def observed_interface(branches: Sequence[Branch]) -> str:

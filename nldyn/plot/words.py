@@ -13,9 +13,8 @@ from nldyn.system.system import System
 
 LENGTHS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 ANGLES = ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "µrad"), (1e-9, "nrad"))
-
 FORCES = ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN"))
-PREFIXED = {"m": LENGTHS, "N": FORCES}
+PREFIXED = {"m": LENGTHS, "rad": ANGLES, "N": FORCES}
 
 
 @dataclass(frozen=True)
@@ -33,6 +32,7 @@ class Along:
 
     Examples
     --------
+    >>> from nldyn.system.chart import THE_FREQUENCY
     >>> gap = Along.of(Parameter("gap"), 5e-5)
     >>> gap.told(1.23e-5), gap.label, Along.of(THE_FREQUENCY, 90.0).told(23.0)
     ('gap 12.3 µm', 'gap (µm)', '23 Hz')
@@ -43,9 +43,11 @@ class Along:
     unit: str = "Hz"
 
     @classmethod
-    def of(cls, parameter: Parameter, largest: float) -> Along:
-        """For values up to a largest one."""
+    def of(cls, parameter: Parameter, largest: float, system: System | None = None) -> Along:
+        """For values up to a largest one; of a system, whose stops may act on rotations."""
         unit = unit_of(parameter)
+        if parameter.name == "gap" and system is not None:
+            unit = system.unit(system.stops[parameter.index].at)
         if unit in PREFIXED:
             return cls(parameter, *axis_unit(largest, PREFIXED[unit]))
         return cls(parameter, 1.0, "" if unit == "1" else unit)

@@ -42,7 +42,8 @@ def answer_lines(diagram: Diagram, special_points: Table) -> list[str]:
     nodes = [node for branch in diagram.branches for node in branch.nodes]
     if not nodes:
         return []
-    along = Along.of(diagram.parameter, max(map(abs, diagram.limits)))
+    largest = max(map(abs, diagram.limits))
+    along = Along.of(diagram.parameter, largest, nodes[0].orbit.system)
     stable = joined(stable_ranges(diagram.branches), diagram.limits)
     return [
         _peak_line(nodes, along, diagram.observe),

@@ -123,7 +123,8 @@ def write_page(
     if system is not None:
         direction = direction_of(system, diagram.observe, direction)
     factor, unit = axis_unit(max((max(y) for y in heights), default=1.0), units_of(direction))
-    along = Along.of(diagram.parameter, max(map(abs, diagram.limits)))
+    system = branches[0].points[0].system if branches else None
+    along = Along.of(diagram.parameter, max(map(abs, diagram.limits)), system)
     chosen = chosen_orbits(branches, heights)
     kept = kept_points(branches)
     notes = [*notes, *dict.fromkeys(diagram.notes), *limits(diagram, chosen, kept)]
@@ -346,8 +347,9 @@ def drawn_branches(
                 "x": rounded(node.value / along.factor for node in nodes),
                 "y": rounded(node.orbit.max_abs_displacement / factor for node in nodes),
                 "text": [
-                    orbit_text(cast("Orbit", node.orbit), along.told(node.value, 7), factor, unit)
-                    .replace("\n", "<br>")
+                    orbit_text(
+                        cast("Orbit", node.orbit), along.told(node.value, 7), factor, unit
+                    ).replace("\n", "<br>")
                     for node in nodes
                 ],
             }

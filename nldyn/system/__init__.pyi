@@ -1,5 +1,6 @@
 """What is computed: the names that are not in the face of nldyn."""
 
+from nldyn.system.chart import OwnParameter as OwnParameter
 from nldyn.system.contact_law import CompiledLaw as CompiledLaw
 from nldyn.system.equilibrium import closed_at_rest as closed_at_rest
 from nldyn.system.equilibrium import rest as rest

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -72,6 +72,56 @@ THE_FREQUENCY = Parameter(FREQUENCY)
 LAST_DIGIT = 1e-14  # relative: a value so near to the end of its range is that
 
 
+@dataclass(frozen=True, kw_only=True)
+class OwnParameter(Parameter):
+    """A number of your own: a function of what a system is made of.
+
+    Branches, diagrams and curves are followed along it as along any other parameter, with
+    differences in place of derivatives. Files of results hold no code, so they refuse it.
+
+    Parameters
+    ----------
+    name : str
+        Name in tables, messages and on axes, other than those of the numbers of systems.
+    value : callable
+        Takes a `System`, gives its number.
+    changed : callable
+        Takes a `System` and a value, gives the system with that value, of as many modes.
+    unit : str
+        "1" if it has none.
+
+    Raises
+    ------
+    SystemModelError
+        If the name is one of a system's numbers, or the functions cannot be called.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System
+    >>> from nldyn.system import OwnParameter
+    >>> system = System.from_matrices([[1.0]], [[4.0]], {"x": [1.0]}, stops=[Stop.linear("x", 8.0)])
+    >>> ratio = OwnParameter(
+    ...     name="stiffness ratio",
+    ...     value=lambda system: system.stops[0].stiffness / 4.0,
+    ...     changed=lambda system, ratio: with_value(system, Parameter("stiffness"), 4.0 * ratio),
+    ... )
+    >>> ratio.value(system), value_of(with_value(system, ratio, 3.0), 1.0, ratio)
+    (2.0, 3.0)
+    """
+
+    value: Callable[[System], float]
+    changed: Callable[[System, float], System]
+    unit: str = "1"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.name in NAMES:
+            raise SystemModelError(f"OwnParameter: '{self.name}' is a number of systems itself")
+        for part in ("value", "changed"):
+            if not callable(getattr(self, part)):
+                raise SystemModelError(f"OwnParameter '{self.name}': {part} must be a function")
+
+
 def has_exact_derivatives(parameter: Parameter) -> bool:
     """Whether the flow map differentiates by the parameter itself."""
     return parameter.name in (*_OF_STOPS, *SOURCES, *OF_SPRINGS)
@@ -85,18 +135,21 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     system : System
         The system that must have it.
     parameter : str or Parameter
-        frequency_hz; gap, stiffness, exponent, dissipation, dashpot or restitution of a stop;
-        amplitude, mass_times_radius or force of an excitation; coefficient of a damper;
-        spring_stiffness of a linear spring; k1, k2, ... of a polynomial one; modal_damping (ratio)
-        or natural_frequency_hz of a mode; spin_hz of a system with a `Spin`, or speed_hz, which is
-        spin and frequency in one where they are equal. The index -1 of modal_damping means all
-        modes, which then have one ratio.
+        An `OwnParameter`, or frequency_hz; gap, stiffness, exponent, dissipation, dashpot or
+        restitution of a stop; amplitude, mass_times_radius or force of an excitation; coefficient
+        of a damper; spring_stiffness of a linear spring; k1, k2, ... of a polynomial one;
+        modal_damping (ratio) or natural_frequency_hz of a mode; spin_hz of a system with a `Spin`,
+        or speed_hz, which is spin and frequency in one where they are equal. The index -1 of
+        modal_damping means all modes, which then have one ratio.
 
     Raises
     ------
     SystemModelError
         If there is no such number.
     """
+    if isinstance(parameter, OwnParameter):
+        _own_value(system, parameter)
+        return parameter
     if isinstance(parameter, str):
         parameter = Parameter(parameter)
     if not isinstance(parameter, Parameter) or parameter.name not in NAMES:
@@ -159,7 +212,7 @@ def label_of(parameter: Parameter) -> str:
 
 def unit_of(parameter: Parameter) -> str:
     """Unit of a parameter, 1 if it has none."""
-    return UNITS[parameter.name]
+    return parameter.unit if isinstance(parameter, OwnParameter) else UNITS[parameter.name]
 
 
 def words_of(parameter: Parameter) -> str:
@@ -199,6 +252,8 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
     0.02
     """
     name, index = parameter.name, parameter.index
+    if isinstance(parameter, OwnParameter):
+        return _own_value(system, parameter)
     if name == FREQUENCY:
         return frequency_hz
     if name in (SPIN, SPEED):
@@ -234,6 +289,13 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
         For a value that the number cannot have.
     """
     name, index = parameter.name, parameter.index
+    if isinstance(parameter, OwnParameter):
+        changed = parameter.changed(system, value)
+        if not (isinstance(changed, System) and changed.size == system.size):
+            raise SystemModelError(
+                f"parameter '{name}': its function must give a System of {system.size} modes"
+            )
+        return changed
     if name == FREQUENCY:
         return system
     if name in (SPIN, SPEED):
@@ -263,6 +325,16 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
         natural[index] = 2.0 * math.pi * value
         damping[index, index] *= value / system.frequencies_hz[index]
     return replace(system, natural_frequencies=natural, damping=damping)
+
+
+def _own_value(system: System, parameter: OwnParameter) -> float:
+    """What the function of a user's own parameter gives, checked."""
+    value = parameter.value(system)
+    if not is_finite(value):
+        raise SystemModelError(
+            f"parameter '{parameter.name}': its function must give a number, got {shown(value)}"
+        )
+    return float(value)
 
 
 def _polynomial(system: System, index: int) -> PolynomialSpring:

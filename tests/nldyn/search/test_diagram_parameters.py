@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from bilinear import Bilinear, PiecewiseOrbit
 from one_impact import OneImpact
 from paper.jobs import scene_system
 from scipy.optimize import brentq
@@ -31,7 +32,7 @@ from nldyn.io import CheckpointFile
 from nldyn.orbits import OrbitSearchOptions
 from nldyn.search import ClosedWalks, Mixtures, PseudoOrbits, SubharmonicSeed
 from nldyn.search.fixed_point_index import index_gaps
-from nldyn.system.chart import with_value
+from nldyn.system.chart import OwnParameter, with_value
 from nldyn.system.parameters import Parameter
 
 QUICK = {"search_points": 4, "search": OrbitSearchOptions(starts=2)}
@@ -120,6 +121,27 @@ def test_the_flip_over_the_restitution_has_a_closed_form():
     assert flips == pytest.approx([brentq(off, 0.3, 0.98, xtol=1e-14)], rel=1e-8)
     (doubled,) = found.of_period(2)
     assert np.abs(doubled.values[[0, -1]] - flips[0]).min() < 1e-6
+
+
+def test_the_flip_of_a_bilinear_oscillator_over_the_ratio_of_stiffnesses():
+    """The ratio is a function of the user's own; the motion in two pieces is solved for."""
+    oscillator = Bilinear(0.1, 1.0, 5.0, 0.3, 1.0)
+    ratio = OwnParameter(
+        name="ratio",
+        value=lambda system: system.stops[0].stiffness,  # over a stiffness of one
+        changed=lambda system, value: with_value(system, Parameter("stiffness"), value),
+    )
+    found = diagram(
+        oscillator.system, (0.5, 60.0), [1], parameter=ratio, frequency_hz=0.33, **QUICK
+    )
+    (flip,) = [s for b in found.branches for s in b.special_points]
+    exact = Bilinear(0.1, 1.0, flip.value, 0.3, 1.0)
+    at_flip = PiecewiseOrbit.near(exact, flip.orbit).solved().at_multiplier(-1)
+    assert flip.kind == "PD"
+    assert at_flip.frequency_hz == pytest.approx(0.33, rel=1e-8)
+    assert "ratio = 0.5 to 60 at 0.33 Hz" in repr(found)
+    with pytest.raises(SystemModelError, match="is a function of your own"):
+        nldyn.save(found, "ratio.h5")
 
 
 def test_indices_add_up_to_one_at_every_gap(over_gap):
