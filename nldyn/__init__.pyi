@@ -38,7 +38,6 @@ from nldyn.branches.step_control import ContinuationOptions as ContinuationOptio
 
 # curves: families in any one or two parameters
 from nldyn.curves.curves import continue_constant as continue_constant
-from nldyn.curves.curves import continue_orbit as continue_orbit
 from nldyn.curves.curves import continue_special as continue_special
 from nldyn.curves.resonances import phase_resonance as phase_resonance
 

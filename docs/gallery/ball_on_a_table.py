@@ -9,8 +9,8 @@ $a/g = \\sqrt{(\\pi(1-e)/(1+e))^2 + (2(1+e^2)/(1+e)^2)^2}$
 import matplotlib.pyplot as plt
 import numpy as np
 
-from nldyn import ConstantForce, HarmonicForce, RigidStop, System, continue_orbit, solve_orbit
-from nldyn.plot import plot_orbit_curve
+from nldyn import ConstantForce, HarmonicForce, RigidStop, System, continue_branch, solve_orbit
+from nldyn.plot import plot_diagram
 
 gravity, hz, e, shaken = 9.81, 10.0, 0.5, 1.2 * 9.81
 omega, period = 2 * np.pi * hz, 1 / hz
@@ -26,13 +26,13 @@ phase = -np.arcsin(gravity * period * (1 - e) / (2 * (1 + e)) * omega / shaken)
 later = -phase / omega
 height = gravity * later * (period - later) / 2 - shaken / omega**2 * (1 - np.cos(phase))
 orbit = solve_orbit(ball, hz, guess=[height, gravity * (period / 2 - later)])
-curve = continue_orbit(orbit, "amplitude", (1.1 * gravity, 1.8 * gravity))
+branch = continue_branch(orbit, (1.1 * gravity, 1.8 * gravity), parameter="amplitude")
 fig, ax = plt.subplots()
-plot_orbit_curve(curve, ax)
+plot_diagram([branch], ax)
 ax.set_title("Ball on a shaking table, restitution 0.5")
 
-(flip,) = [mark for mark in curve.marks if mark.kind == "PD"]
-found = flip.values[0] / gravity
+(flip,) = [special for special in branch.special_points if special.kind == "PD"]
+found = flip.value / gravity
 known = np.hypot(np.pi * (1 - e) / (1 + e), 2 * (1 + e**2) / (1 + e) ** 2)
 print(f"{found:.9f} g, in closed form {known:.9f} g")
 assert abs(found / known - 1) < 1e-7

@@ -310,6 +310,8 @@ class LegBuilder:
         ahead = len(self.nodes) - pairs  # nodes that stay beyond those searched
         while self._searched < len(self.nodes) - ahead:
             a, b = self.nodes[self._searched : self._searched + 2]
+            if not b.point[:-1].any():  # rest, of which the others are multiples
+                break
             before = self.nodes[self._searched - 1] if self._searched > self._piece else None
             after = next(iter(self.nodes[self._searched + 2 :]), None)
             try:

@@ -1,4 +1,4 @@
-"""Families in any one or two parameters: the names that are not in the face of nldyn."""
+"""Families in two parameters: the names that are not in the face of nldyn."""
 
 from nldyn.curves.curves import Curve as Curve
 from nldyn.curves.marks import refine_special as refine_special

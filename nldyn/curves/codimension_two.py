@@ -25,9 +25,7 @@ UNIT_PRODUCT = 1e-6  # distance from 1 of products on a curve where they are 1
 DOUBLE = 1e-6  # product of unit null vectors from which a multiplier counts as double
 
 
-def codimension_tests(
-    condition: Condition, at: Evaluation, parameter_tangent: float | None
-) -> dict[str, float]:
+def codimension_tests(condition: Condition, at: Evaluation) -> dict[str, float]:
     """Test functions by the name of the point at which they vanish.
 
     Parameters
@@ -36,8 +34,6 @@ def codimension_tests(
         What holds on the curve.
     at : Evaluation
         A point of it.
-    parameter_tangent : float, optional
-        Parameter part of the tangent where the curve is a branch in one parameter.
 
     Returns
     -------
@@ -57,12 +53,10 @@ def codimension_tests(
         return tests
     if isinstance(condition, BranchPointCondition):
         return along_branch_points(mu)
-    tests = {"PD": flip_test(mu), "NS": torus_test(mu) if mu.size > 2 else 1.0}
-    if parameter_tangent is None:
-        tests["LP"] = branch_point_test(mu)
-    else:
-        tests["LP"] = parameter_tangent
-        tests["BP"] = branch_point_test(mu)
+    tests = {
+        "PD": flip_test(mu), "NS": torus_test(mu) if mu.size > 2 else 1.0,
+        "LP": branch_point_test(mu),
+    }  # fmt: skip
     if not isinstance(condition, Grazing):
         return tests
     found = {f"GR{name}": value for name, value in tests.items()}

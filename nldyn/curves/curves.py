@@ -1,4 +1,4 @@
-"""Continuation in any parameter: branches, curves of special points, curves of a held quantity."""
+"""Continuation in two parameters: curves of special points, and of a held quantity."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from nldyn.base.errors import (
     is_finite,
     shown,
 )
-from nldyn.bifurcations.point import check_special
+from nldyn.bifurcations.chord import Chord
+from nldyn.bifurcations.point import BranchNode, check_special
 from nldyn.bifurcations.roots import root
+from nldyn.branches.arclength import Stepper
+from nldyn.branches.continuation import start_point
 from nldyn.branches.endings import Ending, StopReasons, has_ending
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.branches.tables import orbit_columns
 from nldyn.curves.marks import (
-    CurveChord,
     Located,
     LocatedPoint,
-    beyond_grazing,
-    grazing_at_end,
     marks_between,
 )
 from nldyn.curves.point import CurvePoint, curve_point, passages
 from nldyn.curves.walk import CurveWalk
 from nldyn.flow.flow_map import FlowMap, same_flow
-from nldyn.orbits.bordered import Condition, Free, OrbitFamily, correct, gradient, tangent_surface
+from nldyn.orbits.bordered import Condition, OrbitFamily, correct, gradient, tangent_surface
 from nldyn.orbits.conditions import Held, Monitor, defined_by
 from nldyn.orbits.orbit import Orbit, check_minimal, same_orbit
 from nldyn.runtime.keeper import Keeper
@@ -78,12 +78,12 @@ class CurveFile(Protocol):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Curve:
-    """A curve of periodic orbits in one or two parameters.
+    """A curve of periodic orbits in two parameters.
 
     Parameters
     ----------
     kind : str
-        What the orbits have in common: LP, PD, NS, GR, the name of a monitor, or orbit.
+        What the orbits have in common: LP, PD, NS, BP, GR, or the name of a monitor.
     parameters : tuple of Parameter
         What changes.
     points : tuple of CurvePoint
@@ -189,9 +189,7 @@ class Curve:
         SystemModelError
             For ranges that do not contain the curve, or a file that holds something else.
         """
-        charts = _charts(
-            self.orbits[0], self.parameters, ranges, options, progress, len(self.parameters)
-        )
+        charts = _charts(self.orbits[0], self.parameters, ranges, options, progress)
         for chart, column in zip(charts, self.values.T, strict=True):
             chart.check_start(float(column.min()))
             chart.check_start(float(column.max()))
@@ -245,62 +243,6 @@ def _column_name(parameter: Parameter) -> str:
 
 
 @shows_progress(of_place("curve"))
-def continue_orbit(
-    orbit: Orbit,
-    parameter: str | Parameter,
-    limits: tuple[float, float],
-    *,
-    options: ContinuationOptions | None = None,
-    progress: Callable[[Real], None] | None = None,
-    checkpoint: CurveFile | None = None,
-) -> Curve:
-    """Continue an orbit in one parameter, all others held.
-
-    Parameters
-    ----------
-    orbit : Orbit
-        Where to start.
-    parameter : str or Parameter
-        See `nldyn.system.chart.checked_parameter`.
-    limits : (float, float)
-        Values between which to stay; ends are met exactly.
-    options : ContinuationOptions, optional
-        Step control.
-    progress : callable, optional
-        Called with the parameter's value at every point.
-    checkpoint : CheckpointFile, optional
-        A new HDF5 file that keeps the curve, written now and then, at the end, and when an
-        exception such as Ctrl-C ends the computation: `nldyn.load` and `Curve.extend` go on.
-
-    Returns
-    -------
-    Curve
-        Its marks are the special points LP, PD, NS, BP and GR.
-
-    Raises
-    ------
-    SystemModelError
-        For a parameter that there is not, or a range that does not hold the start.
-    ConvergenceError
-        If Newton's method does not meet the orbit again.
-
-    Examples
-    --------
-    >>> from nldyn import System, Stop, Unbalance, solve_orbit
-    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
-    ...     stops=[Stop("middle", stiffness=5.17e9, gap=2e-6)],
-    ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> curve = continue_orbit(solve_orbit(system, 20.0), "gap", (1e-6, 1e-5))
-    >>> [f"{value:.6g}" for value in curve.values[[0, -1], 0]]
-    ['1e-06', '1e-05']
-    """
-    charts = _charts(orbit, [parameter], [limits], options, progress)
-    keeper = _keeper(checkpoint)
-    start = _start(OrbitFamily.around(orbit, charts), orbit, Free())
-    return _curve("orbit", start, options, progress, keeper)
-
-
-@shows_progress(of_place("curve"))
 def continue_special(
     special: Located,
     parameters: Sequence[str | Parameter],
@@ -349,7 +291,7 @@ def continue_special(
     Yu. A. Kuznetsov (2004), *Elements of Applied Bifurcation Theory*, section 10.3.
     """
     check_special("continue_special", special, of_branch=False)
-    charts = _charts(special.orbit, parameters, ranges, options, progress, 2)
+    charts = _charts(special.orbit, parameters, ranges, options, progress)
     keeper = _keeper(checkpoint)
     curve = _curve(special.kind, special_start(special, charts), options, progress, keeper)
     if len(curve.points) == 1 and has_ending(curve.stop_reasons, Ending.DISSOLVED):
@@ -418,7 +360,7 @@ def continue_constant(
     ConvergenceError
         If no orbit with the value is found on the way; the text says which values are.
     """
-    charts = _charts(orbit, parameters, ranges, options, progress, 2)
+    charts = _charts(orbit, parameters, ranges, options, progress)
     keeper = _keeper(checkpoint)
     condition = Held.of(monitor, value, orbit)
     orbit = _with_value(orbit, condition, charts[0], options or ContinuationOptions())
@@ -427,13 +369,14 @@ def continue_constant(
 
 
 def _with_value(orbit: Orbit, condition: Held, chart: Chart, options: ContinuationOptions) -> Orbit:
-    """The orbit that has the value to be held, on the curve of orbits in one parameter."""
+    """The orbit that has the value to be held, on the branch in one parameter."""
     present = condition.monitor(orbit)
     if abs(present / condition.target - 1.0) < CLOSE:
         return orbit
-    start = _start(OrbitFamily.around(orbit, (chart,)), orbit, Free())
+    start = start_point(OrbitFamily.around(orbit, (chart,)).place(orbit), 1.0)
     ends, met = [start, start.reversed()], [present]
-    for pair in zip_longest(*(CurveWalk(end, options) for end in ends)):
+    walks = (Stepper(end, (chart.low, chart.high), options) for end in ends)
+    for pair in zip_longest(*walks):
         for side, point in enumerate(pair):
             if point is None:
                 continue
@@ -445,7 +388,7 @@ def _with_value(orbit: Orbit, condition: Held, chart: Chart, options: Continuati
                 return found
             ends[side] = point
             met.append(condition.monitor(point.orbit))
-    name, places = chart.parameter.name, sorted(float(end.values[0]) for end in ends)
+    name, places = chart.parameter.name, sorted(end.value for end in ends)
     raise ConvergenceError(
         f"no orbit with {condition.name} = {condition.target:g} was found: it is {present:g} at "
         f"the start and from {min(met):g} to {max(met):g} where {name} goes from {places[0]:g} to "
@@ -453,15 +396,15 @@ def _with_value(orbit: Orbit, condition: Held, chart: Chart, options: Continuati
     )
 
 
-def _between(condition: Held, a: CurvePoint, b: CurvePoint) -> Orbit | None:
-    """The orbit with the value to be held between two points of a curve, if they lie about it."""
+def _between(condition: Held, a: BranchNode, b: BranchNode) -> Orbit | None:
+    """The orbit with the value to be held between two points of a branch, if they lie about it."""
 
-    def off(point: CurvePoint) -> float:
+    def off(point: BranchNode) -> float:
         return float(condition.monitor(point.orbit)) / condition.target - 1.0
 
     if not off(a) * off(b) <= 0.0:
         return None
-    chord = CurveChord(a, b)
+    chord = Chord(a, b)
     return chord.at(root(lambda sigma: off(chord.at(sigma)))[0]).orbit
 
 
@@ -481,7 +424,6 @@ def _charts(
     ranges: Sequence[tuple[float, float]],
     options: ContinuationOptions | None,
     progress: Callable[[Real], None] | None,
-    count: int = 1,
 ) -> tuple[Chart, ...]:
     """Charts of the parameters, checked against the start; other arguments are checked as well."""
     check_types(
@@ -492,9 +434,9 @@ def _charts(
         progress=(progress, Callable, None),
     )
     check_minimal(orbit)
-    if len(parameters) != count:
+    if len(parameters) != 2:
         raise SystemModelError(f"a curve of this kind needs two parameters, got {len(parameters)}")
-    if len(ranges) != count:
+    if len(ranges) != 2:
         raise SystemModelError("give as many ranges as parameters, one pair of numbers each")
     chosen = [checked_parameter(orbit.system, parameter) for parameter in parameters]
     if len(set(chosen)) < len(chosen):
@@ -567,8 +509,6 @@ def _followed(
     forward: list[CurvePoint] = []
     backward: list[CurvePoint] = []
     first, last = curve.stop_reasons
-    grazed: dict[bool, list[LocatedPoint]] = {False: [], True: []}  # at the end, the beginning
-    unmarked: list[str] = []
     chosen = options or ContinuationOptions()
 
     def is_closed() -> bool:
@@ -591,22 +531,12 @@ def _followed(
             end, origin = points[-1], points[0]
             if leg is backward:
                 end, origin = origin.reversed(), end.reversed()
-            begin: CurvePoint | None = end
-            while begin is not None:
-                walk, known = CurveWalk(begin, chosen, origin), len(leg)
-                for point in walk:
-                    leg.append(point)
-                    if progress is not None:
-                        progress(point.values)
-                    keeper.offer()
-                begin, grazes = None, walk.stop_reason.ending is Ending.GRAZES_RIGID
-                if grazes and known + 1 < len(leg) < chosen.max_points:
-                    begin = beyond_grazing(leg[-1])
-            if len(leg) > 1 and grazes:
-                grazed[leg is backward], missed = grazing_at_end(leg[-1])
-                unmarked += missed
-                if missed:
-                    walk.stop_reason = walk.too_short()
+            walk = CurveWalk(end, chosen, origin)
+            for point in walk:
+                leg.append(point)
+                if progress is not None:
+                    progress(point.values)
+                keeper.offer()
             if leg is forward:
                 last = walk.stop_reason
             else:
@@ -616,15 +546,13 @@ def _followed(
         points = whole().points
         if has_ending(curve.stop_reasons, Ending.NOT_FINISHED):
             marks, notes = _marked(points)
-            marks = [*grazed[True], *marks, *grazed[False]]
         else:
             (ahead, notes), (before, lost) = _marked(forward), _marked(backward)
-            marks = [*grazed[True], *before[::-1], *curve.marks, *ahead, *grazed[False]]
+            marks = [*before[::-1], *curve.marks, *ahead]
             notes = [*curve.notes, *notes, *lost]
         done = replace(
-            curve, points=points, marks=tuple(marks), stop_reasons=(first, last),
-            notes=(*notes, *unmarked),
-        )  # fmt: skip
+            curve, points=points, marks=tuple(marks), stop_reasons=(first, last), notes=tuple(notes)
+        )
         keeper.work = lambda: done
     return done
 

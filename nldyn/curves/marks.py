@@ -10,27 +10,18 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES, LocateError, check_whole
-from nldyn.bifurcations.beyond_rigid_grazing import (
-    SLIGHT,
-    SLIGHT_BY_DIFFERENCES,
-    crosses_beside,
-    orbit_beyond,
-)
 from nldyn.bifurcations.point import check_special
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import leaves_circle
 from nldyn.bifurcations.touching import Touch, touching_extremes
-from nldyn.branches.arclength import grazing_between
 from nldyn.curves.codimension_two import is_torus, torus_pair
 from nldyn.curves.point import CurvePoint, between, clear_of_nodes, curve_point
 from nldyn.curves.walk import UNFOLDED, is_torus_curve
 from nldyn.orbits.bordered import (
     Condition,
-    Free,
     OrbitFamily,
     correct,
     length_unit,
-    nearest_depth,
 )
 from nldyn.orbits.conditions import (
     Both,
@@ -38,10 +29,8 @@ from nldyn.orbits.conditions import (
     Grazing,
     Singular,
     defined_by,
-    grazing_beside,
 )
 from nldyn.orbits.orbit import Orbit
-from nldyn.orbits.shooting import metric_length
 from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.system.parameters import Parameter
 
@@ -195,8 +184,6 @@ def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], lis
     """What is met between two neighbouring points of a curve, in order, and what may be missing."""
     if not (np.any(a.orbit.point[:-1]) and np.any(b.orbit.point[:-1])):
         return [], []  # from rest on, of which the others are multiples
-    if isinstance(a.condition, Free) and grazing_between(a.orbit, b.orbit):
-        return _across_grazing(a, b)
     a, b = clear_of_nodes(a, b)
     chord = CurveChord(a, b)
     found: list[tuple[float, LocatedPoint]] = []
@@ -223,64 +210,6 @@ def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], lis
         found.append((1.0, _marked(b.corner, b, b.found.step)))
     found.sort(key=lambda pair: pair[0])
     return [mark for _, mark in found], notes
-
-
-def grazing_at_end(end: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
-    """The grazing of a rigid stop at which a curve of orbits in one parameter ends, or a note."""
-    if not isinstance(end.condition, Free):
-        return [], []
-    try:
-        return [_rigid_grazing(end)], []
-    except FAILURES as error:
-        return [], [_missing("GR", end, error)]
-
-
-def _rigid_grazing(beside: CurvePoint) -> LocatedPoint:
-    """The grazing of a rigid stop beside a point of a curve in one parameter.
-
-    Raises
-    ------
-    LocateError
-        If it is not found.
-    """
-    family = beside.found.at.family
-    found = grazing_beside(beside)
-    if found is None:
-        raise LocateError("the grazing of a rigid stop was not found")
-    return LocatedPoint(
-        "GR", found.orbit, (family.charts[0].parameter,), found.at.values,
-        found.residual(found.condition), found.step,
-    )  # fmt: skip
-
-
-def beyond_grazing(end: CurvePoint) -> CurvePoint | None:
-    """Where a curve of orbits in one parameter goes on behind a grazing of a rigid stop."""
-    if not isinstance(end.condition, Free):
-        return None
-    family, grazing = end.found.at.family, grazing_beside(end)
-    if grazing is None:
-        return None
-    found = orbit_beyond(grazing.orbit, end.orbit, family)
-    if found is None:
-        return None
-    weights = family.metric(end.point)
-    ways = grazing.at.point - end.point, found.at.point - grazing.at.point
-    length = end.arclength + sum(metric_length(weights, way) for way in ways)
-    return curve_point(found, end.condition, ways[1], length)
-
-
-def _across_grazing(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
-    """The grazing of a rigid stop between two points of orbits with and without its impact."""
-    near = min(a, b, key=lambda point: nearest_depth(point.orbit))
-    try:
-        grazing, notes = _rigid_grazing(near), []
-    except FAILURES as error:
-        return [], [_missing("GR", near, error)]
-    slightest = (SLIGHT if a.found.at.family.is_exact else SLIGHT_BY_DIFFERENCES)[-1]
-    if any(crosses_beside(grazing.orbit, side.orbit, slightest) for side in (a, b)):
-        why = "multipliers may cross the unit circle right beside the grazing"
-        notes.append(_missing("a special point", a, why))
-    return [grazing], notes
 
 
 def _touched(touches: Sequence[Touch], chord: CurveChord) -> tuple[float, LocatedPoint]:
@@ -356,8 +285,6 @@ def _changes_of_sign(
     names = [name for name in a.tests if a.tests[name] * b.tests[name] < 0.0]
     if not leaves_circle(a.orbit.multipliers, b.orbit.multipliers):
         names = [name for name in names if name not in ("NS", "GRNS")]
-    if "LP" in names and "BP" in names:  # at a fold both change sign
-        names.remove("BP")
     return [
         (name, lambda point, name=name: point.tests[name])  # type: ignore[misc]
         for name in names
@@ -390,15 +317,9 @@ def _is_true(name: str, point: CurvePoint) -> bool:
 
 
 def _marked(name: str, point: CurvePoint, error: float) -> LocatedPoint:
-    """A mark on a curve; on a branch in one parameter it is polished by its defining system."""
+    """A mark on a curve."""
     parameters = tuple(chart.parameter for chart in point.found.at.family.charts)
-    mark = LocatedPoint(name, point.orbit, parameters, point.values, point.residual, abs(error))
-    if isinstance(point.condition, Free):
-        try:
-            return refine_special(mark, parameters[0])
-        except FAILURES:
-            return mark
-    return mark
+    return LocatedPoint(name, point.orbit, parameters, point.values, point.residual, abs(error))
 
 
 def _missing(name: str, point: CurvePoint, why: Exception | str) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES
 from nldyn.curves.codimension_two import codimension_tests
-from nldyn.orbits.bordered import Condition, Corrected, Evaluation, Free, OrbitFamily, correct
+from nldyn.orbits.bordered import Condition, Corrected, Evaluation, OrbitFamily, correct
 from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.impact_phases import nodes_to_impacts, start_far_from_impacts
 from nldyn.orbits.orbit import Orbit
@@ -78,10 +78,7 @@ class CurvePoint:
     @cached_property
     def tests(self) -> dict[str, float]:
         """Test functions of what may be met on the curve."""
-        one = isinstance(self.condition, Free)
-        return codimension_tests(
-            self.condition, self.found.at, float(self.tangent[-1]) if one else None
-        )
+        return codimension_tests(self.condition, self.found.at)
 
     def on_charts(self, charts: tuple[Chart, ...]) -> CurvePoint:
         """The same point with its parameters on the scales of other ranges."""

@@ -16,8 +16,8 @@ from nldyn.branches.arclength import (
     BESIDE_STEP,
     FARTHEST_OFF,
     GRAZES,
+    SCALES,
     grazes_rigid,
-    grazing_between,
     loses_impact,
     scales,
 )
@@ -33,7 +33,7 @@ from nldyn.curves.point import (
     on_chart_plane,
     on_plane,
 )
-from nldyn.orbits.bordered import Condition, Free, correct, nearest_depth
+from nldyn.orbits.bordered import Condition, correct, nearest_depth
 from nldyn.orbits.conditions import BranchPointCondition, Grazing, Held, Singular
 from nldyn.orbits.impact_phases import nodes_to_impacts, start_far_from_impacts
 from nldyn.orbits.shooting import FROM_NEAR, metric_length
@@ -102,8 +102,9 @@ class CurveWalk:
         ahead: list[CurvePoint] = []  # a corner, and what is behind it
         before = None
         for _ in range(self.options.max_points):
-            if rest := before and self._scaled_to_rest(before, here):
-                yield rest
+            rest = before and self._scaled_to_rest(before, here)
+            if rest is not None:
+                yield from rest
                 return
             attempt = None
             seen = bool(here.corner)
@@ -215,8 +216,6 @@ class CurveWalk:
             cosine = cosine_near(there.orbit.multipliers, self._cosine)
             if abs(cosine - self._cosine) > TURN:  # a neutral saddle, or another pair
                 return None
-        if isinstance(here.condition, Free) and grazing_between(here.orbit, there.orbit):
-            return None  # the curve with the impact and that without meet in a corner
         touched = there.orbit.impacts != here.orbit.impacts
         grazes = isinstance(here.condition, Grazing)
         if touched and not grazes:
@@ -280,24 +279,30 @@ class CurveWalk:
                     return end
         return None
 
-    def _scaled_to_rest(self, before: CurvePoint, here: CurvePoint) -> CurvePoint | None:
-        """Rest, at the end of a range at zero to which orbits shrink in proportion, or None.
+    def _scaled_to_rest(self, before: CurvePoint, here: CurvePoint) -> list[CurvePoint] | None:
+        """What ends the walk where orbits shrink in proportion to parameters whose ranges end at 0.
 
-        They would do so for ever on the scale of their own size.
+        They would do so for ever on the scale of their own size. It is rest, but where no orbit of
+        the condition is found there; None if they do not.
         """
-        family, condition = here.found.at.family, here.condition
-        if len(family.charts) > 1 or not isinstance(condition, Free):
+        family = here.family
+        scaled = np.ones(here.point.size, dtype=bool)
+        scaled[family.n_states :] = False
+        for place, chart in enumerate(family.charts, family.n_states):
+            scaled[place] = chart.low == 0.0
+        (places,) = np.nonzero(scaled)
+        names = [chart.parameter.name for chart in family.charts if chart.low == 0.0]
+        if not names or here.tangent[places[-1]] >= 0.0:
             return None
-        if family.charts[0].low != 0.0 or here.tangent[-1] >= 0.0:
+        secant = (here.point - before.point) / (here.arclength - before.arclength)
+        held = float(np.abs(secant[~scaled]).max(initial=0.0))
+        if held > SCALES or not scales(here.point[scaled], secant[scaled]):
             return None
-        if not all(scales(point.point, point.tangent) for point in (before, here)):
-            return None
-        length = metric_length(family.metric(here.point), here.point)
-        rest = on_plane(here, -here.point, length, 0, 0.0)
-        if rest is not None:
-            name = family.charts[0].parameter.name
-            self.stop_reason = Ending.SCALES_TO_REST.told(parameter=name)
-        return rest
+        self.stop_reason = Ending.SCALES_TO_REST.told(parameter=" and ".join(names))
+        way = np.where(scaled, -here.point, 0.0)
+        length = metric_length(family.metric(here.point), way)
+        rest = on_plane(here, way, length, int(places[-1]) - family.n_states, 0.0)
+        return [] if rest is None else [rest]
 
     def _end(self, here: CurvePoint, there: CurvePoint) -> list[CurvePoint] | None:
         """The last points of the walk if it ends in this step."""

@@ -87,9 +87,10 @@ class CheckpointFile:
     def read_curves(self, system: System, monitor: Callable[[Orbit], float] | None) -> list[Curve]:
         """The curves of a system that it holds."""
         laws = laws_of(system)
-        return begun_before(
+        found = begun_before(
             lambda path: load_curves(path, laws=laws, monitor=monitor), Path(self.path)
         )
+        return [each for each in found if isinstance(each, Curve)]
 
     def write_curves(self, curves: Sequence[Curve]) -> None:
         """Keep curves in place of what it holds."""

@@ -17,6 +17,10 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, shown
+from nldyn.bifurcations.branch_crossing import distance
+from nldyn.bifurcations.point import BranchNode, SpecialPoint
+from nldyn.branches.branch import Branch
+from nldyn.branches.continuation import make_branch
 from nldyn.branches.endings import StopReason
 from nldyn.branches.tables import UNITS
 from nldyn.curves.curves import Curve
@@ -25,7 +29,7 @@ from nldyn.curves.point import CurvePoint
 from nldyn.flow.flow_map import FlowMap
 from nldyn.io.flow import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
 from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute
-from nldyn.orbits.bordered import Condition, Corrected, Evaluation, Free, OrbitFamily
+from nldyn.orbits.bordered import FREE, Condition, Corrected, Evaluation, OrbitFamily
 from nldyn.orbits.conditions import MONITORS, BranchPointCondition, Grazing, Held, Singular
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem
@@ -68,8 +72,8 @@ def save_curves(path: str | Path, curves: Sequence[Curve]) -> None:
 
 def load_curves(
     path: str | Path, *, laws: Laws | None = None, monitor: OwnMonitor | None = None
-) -> list[Curve]:
-    """Read all curves of a file; see `nldyn.load`.
+) -> list[Curve | Branch]:
+    """Read all curves of a file, and branches that were written as such; see `nldyn.load`.
 
     Their orbits are made of their unknowns when they are asked for, by the flow map.
     """
@@ -78,6 +82,22 @@ def load_curves(
     with opened(path, FORMAT, FORMAT_VERSION) as root:
         groups = root.group("curves").groups()
         return [_read_curve(group, known, monitor) for group in groups]
+
+
+def _as_branch(curve: Curve) -> Branch:
+    """What an earlier version wrote as a curve of orbits in one parameter."""
+    nodes = [
+        BranchNode(point.family, point.point, point.orbit, point.tangent, point.arclength)
+        for point in curve.points
+    ]
+    special = []
+    for mark in curve.marks:
+        place = nodes[0].family.place(mark.orbit)
+        near = min(nodes, key=lambda node: distance(node, place))
+        away = float((place.point - near.point) @ (near.family.metric(near.point) * near.tangent))
+        node = BranchNode.of(place, near.tangent, near.arclength + away)
+        special.append(SpecialPoint(mark.kind, node, mark.error))
+    return make_branch("", nodes, special, curve.stop_reasons, list(curve.notes))
 
 
 def _write_curve(group: Any, curve: Curve) -> None:
@@ -125,7 +145,6 @@ def _write_curve(group: Any, curve: Curve) -> None:
 def _numbers_of(condition: Condition) -> dict[str, Any]:
     """The numbers of a condition, by the names of its fields."""
     names = {
-        Free: (),
         Singular: ("left", "right"),
         BranchPointCondition: ("left", "right", "unit"),
         Grazing: ("stop", "is_maximum", "phase", "unit", "half", "every"),
@@ -134,7 +153,7 @@ def _numbers_of(condition: Condition) -> dict[str, Any]:
     return {name: getattr(condition, name) for name in names}
 
 
-def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
+def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve | Branch:
     family = _read_family(group, laws)
     size = family.n_states + family.n_free
     corners, reasons = group.texts("corners"), group.texts("stop_reasons")
@@ -148,7 +167,7 @@ def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
     ]
     if len(reasons) != 2 or not count:
         raise group.fault("attribute", "stop_reasons", "must have two entries, of some points")
-    return Curve(
+    curve = Curve(
         group.text("kind"),
         tuple(chart.parameter for chart in family.charts),
         tuple(map(CurvePoint, found, conditions, tangents, lengths.tolist(), corners)),
@@ -156,6 +175,7 @@ def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve:
         (StopReason(reasons[0]), StopReason(reasons[1])),
         tuple(group.texts("notes")),
     )
+    return _as_branch(curve) if conditions[0] is FREE else curve
 
 
 def _unknowns(group: Group, name: str, family: OrbitFamily, count: int) -> Real:
@@ -209,7 +229,7 @@ def _read_conditions(
     group, n = curve.group("condition"), family.n_states
     kind, of = group.text("kind"), curve.text("kind")
     if kind == "Free":
-        return [Free()] * count
+        return [FREE] * count
     if kind == "BranchPoint":
         left, unit = group.array("left", count, n), group.array("unit", count, n + 1)
         return list(map(BranchPointCondition, left, group.array("right", count, 2, n + 1), unit))

@@ -91,7 +91,7 @@ def load(
     *,
     laws: Laws | None = None,
     monitor: Callable[[Orbit], float] | None = None,
-) -> Diagram | Exploration | list[Branch] | list[Curve]:
+) -> Diagram | Exploration | list[Branch] | list[Curve | Branch]:
     """Read what `save` wrote, or what a running computation keeps; the file knows its kind.
 
     Parameters

@@ -38,6 +38,7 @@ from nldyn.system.rigid_stop import AnyStop
 from nldyn.system.system import System
 
 SAME_PHASE = 1e-9  # in rad: an extreme and an impact
+LIFTS_OFF = 1e-5  # rad behind rest, where a flight that grows with their cube is rounding
 SAME = 1e-5  # distance of orbits that are one, relative to their size
 REPEATS = 1e-6  # the same of an orbit from itself some periods later
 SHALLOW = 1e-3  # of the deepest extreme: depths up to it are told exactly where stops are touched
@@ -374,7 +375,7 @@ class Orbit:
         record = self.trajectory.record
         rests = np.asarray(record.depth[:, stop].any(axis=1))
         found = np.zeros(phases.size, dtype=bool)
-        for near in (phases - SAME_PHASE, phases, phases + SAME_PHASE):
+        for near in (phases - LIFTS_OFF, phases, phases + SAME_PHASE):
             piece = np.searchsorted(record.phase, near, side="right") - 1
             found |= rests[np.clip(piece, 0, None)]
         return found

@@ -1,6 +1,6 @@
 """Pictures of results with matplotlib."""
 
-from nldyn.plot.curves import plot_curves, plot_orbit_curve
+from nldyn.plot.curves import plot_curves
 from nldyn.plot.diagram import plot_diagram
 from nldyn.plot.longterm import (
     plot_basins,
@@ -21,7 +21,6 @@ __all__ = [
     "plot_diagram",
     "plot_history",
     "plot_mac",
-    "plot_orbit_curve",
     "plot_phase_portrait",
     "plot_section",
     "plot_spectra",

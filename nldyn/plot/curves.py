@@ -1,4 +1,4 @@
-"""Draw curves in the plane of two parameters, and curves of orbits over one parameter."""
+"""Draw curves in the plane of two parameters."""
 
 from __future__ import annotations
 
@@ -11,16 +11,10 @@ from nldyn.base.errors import SystemModelError, check_types, shown
 from nldyn.curves.curves import Curve
 from nldyn.plot.diagram import (
     MARKER_NAMES,
-    MARKERS,
     PERIOD_COLOURS,
-    STABLE,
-    UNSTABLE,
     length_unit,
-    mark_style,
     new_axes,
-    stability_runs,
 )
-from nldyn.plot.words import displacement_of
 from nldyn.system.chart import UNITS
 from nldyn.system.parameters import Parameter
 
@@ -98,72 +92,6 @@ def plot_curves(curves: Sequence[Curve], ax: Axes | None = None) -> Axes:
             )
     ax.set_xlabel(labels[0])
     ax.set_ylabel(labels[1])
-    ax.legend(frameon=False)
-    return ax
-
-
-def plot_orbit_curve(curve: Curve, ax: Axes | None = None) -> Axes:
-    """Draw the largest displacement of orbits over the one parameter in which they were continued.
-
-    Stable orbits are drawn solid, unstable ones dotted, special points with the marks of
-    `plot_diagram`.
-
-    Parameters
-    ----------
-    curve : Curve
-        From `continue_orbit`.
-    ax : Axes, optional
-        Where to draw; a new figure unless given.
-
-    Returns
-    -------
-    Axes
-
-    Raises
-    ------
-    SystemModelError
-        If this is no curve of orbits in one parameter.
-
-    Examples
-    --------
-    >>> from nldyn import Stop, System, Unbalance, continue_orbit, solve_orbit
-    >>> system = System.from_modal([13.1], {"middle": [0.635]}, modal_damping=0.0142,
-    ...     stops=[Stop("middle", stiffness=5.17e9, gap=2e-6)],
-    ...     excitation=[Unbalance("middle", 4.92e-6)])
-    >>> ax = plot_orbit_curve(continue_orbit(solve_orbit(system, 20.0), "gap", (1e-6, 1e-5)))
-    >>> ax.get_xlabel(), ax.get_ylabel()
-    ('gap (µm)', 'largest displacement of middle (µm)')
-    """
-    if not (isinstance(curve, Curve) and len(curve.parameters) == 1):
-        raise SystemModelError(
-            f"plot_orbit_curve needs a curve in one parameter, got {shown(curve)}"
-        )
-    check_types(ax=(ax, Axes, None))
-    ax = ax or new_axes(7.5, 5.0)
-    orbits = curve.orbits
-    largest = np.array([orbit.max_abs_displacement for orbit in orbits])
-    scale, label = _scale_and_label(curve.parameters[0], float(np.abs(curve.values).max()))
-    factor, unit = length_unit(float(largest.max()))
-    x, y = curve.values[:, 0] * scale, largest / factor
-    named = set()
-    for run in stability_runs([orbit.stable for orbit in orbits]):
-        name = "stable" if run.stable else "unstable"
-        ax.plot(
-            x[run.start : run.stop], y[run.start : run.stop], color=PERIOD_COLOURS[0], lw=1.4,
-            ls=STABLE if run.stable else UNSTABLE, label=None if name in named else name,
-        )  # fmt: skip
-        named.add(name)
-    for kind in MARKERS:
-        marks = [mark for mark in curve.marks if mark.kind == kind]
-        places = [
-            (float(mark.values[0]) * scale, mark.orbit.max_abs_displacement / factor)
-            for mark in marks
-        ]
-        if places:
-            x_marks, y_marks = zip(*places, strict=True)
-            ax.plot(x_marks, y_marks, label=f"{MARKER_NAMES[kind]} ({kind})", **mark_style(kind))
-    ax.set_xlabel(label)
-    ax.set_ylabel(f"largest {displacement_of(orbits[0].observe)} ({unit})")
     ax.legend(frameon=False)
     return ax
 

@@ -28,7 +28,7 @@ def strength(source: Excitation) -> float:
 class Parameter:
     """A number of a system.
 
-    Motions have exact derivatives by the numbers of stops and excitations. `continue_orbit`
+    Motions have exact derivatives by the numbers of stops and excitations. `continue_branch`
     and the like know those of dampers and modes, too, see `nldyn.system.chart`.
 
     Parameters

@@ -24,7 +24,6 @@ from nldyn import (
     cascade,
     continue_branch,
     continue_constant,
-    continue_orbit,
     continue_special,
     describe_special,
     diagram,
@@ -116,11 +115,10 @@ def test_what_is_no_orbit_cannot_be_drawn(plot, orbit):
 @pytest.mark.parametrize("call", ["in", "special", "constant"])
 def test_arguments_of_curves_are_named(name, call, orbit, flip):
     if call == "in":
-        good = {"orbit": orbit, "parameter": "gap", "limits": (-1e-6, 1e-6)}
-        function, name = (
-            continue_orbit,
-            {"parameters": "parameter", "ranges": "limits"}.get(name, name),
-        )
+        good = {"start": orbit, "limits": (-1e-6, 1e-6), "parameter": "gap"}
+        function = continue_branch
+        own = {"orbit": "start", "parameters": "parameter", "ranges": "limits"}
+        name = own.get(name, name)
     else:
         good = {"orbit": orbit, "parameters": PAIR, "ranges": WINDOW, "monitor": "peak_force"}
         function = continue_constant
@@ -128,11 +126,11 @@ def test_arguments_of_curves_are_named(name, call, orbit, flip):
         good = {"special": flip, "parameters": PAIR, "ranges": WINDOW}
         function = continue_special
         name = {"orbit": "special"}.get(name, name)
-    junk = [x for x in JUNK if not (x is None and name in ("options", "progress"))]
+    junk = [x for x in JUNK if not (x is None and name in ("options", "progress", "parameter"))]
     said = refused(lambda junk: function(**{**good, name: junk}), *junk)
     words = {
         "parameter": ("unknown parameter",),
-        "limits": ("the range of gap must be",),
+        "limits": ("the range of gap must be", "needs limits, the range"),
         "special": ("special point",),
         "parameters": ("parameters must be", "needs two parameters"),
         "ranges": ("ranges must be", "as many ranges"),
@@ -207,7 +205,8 @@ def test_what_is_no_branch_or_curve_cannot_be_drawn(harmonic_branch, orbit):
     check_named(refused(plot_diagram, *junk), "diagram must be a list of branches")
     check_named(refused(cascades_in, *junk), "branches must be a list of branches")
     check_named(refused(plot_curves), "plot_curves needs")
-    curve = continue_orbit(orbit, "frequency_hz", (25.5, 26.5))
+    few = ContinuationOptions(max_points=2)
+    curve = continue_constant(orbit, "peak_force", PAIR, WINDOW, options=few)
     check_named(refused(lambda x: plot_curves([curve, x])), "plot_curves needs")
     axes = [x for x in JUNK if x is not None]
     said = refused(lambda x: plot_diagram([harmonic_branch], x), *axes)
@@ -283,7 +282,8 @@ def test_other_arguments_of_a_wrong_kind_are_named(one_dof, orbit, harmonic_bran
         said = refused(lambda x, kind=kind: kind(x, 1e9), 3, [], math.nan)
         check_named(said, f"{name}: at must be a str")
     curve = tmp_path / "curve.h5"
-    save(continue_orbit(orbit, "frequency_hz", (25.5, 26.5)), curve)
+    few = ContinuationOptions(max_points=2)
+    save(continue_constant(orbit, "peak_force", PAIR, WINDOW, options=few), curve)
     for name in ("laws", "monitor"):
         said = refused(lambda x, name=name: load_curves(curve, **{name: x}), 3, "text", [1])
         check_named(said, f"{name} must be")
@@ -297,7 +297,8 @@ def test_ranges_in_which_there_are_no_systems_are_refused(orbit):
         ("mass_times_radius", (-1.0, 1e-5)), ("exponent", (1.0, 9.0)),
     ):  # fmt: skip
         check_named(
-            refused(lambda x, n=name: continue_orbit(orbit, n, x), limits), f"range of {name}"
+            refused(lambda x, n=name: continue_branch(orbit, x, parameter=n), limits),
+            f"range of {name}",
         )
 
 
@@ -328,7 +329,7 @@ def test_an_orbit_run_through_twice_is_not_continued(flip):
     end = born.nodes[0 if born.stop_reasons[0].startswith("joins") else -1].orbit
     for call in (
         lambda: continue_branch(end, window),
-        lambda: continue_orbit(end, "gap", (-1e-6, 1e-6)),
+        lambda: continue_branch(end, (-1e-6, 1e-6), parameter="gap"),
     ):
         with pytest.raises(SystemModelError, match="is one of period 1, run through 2 times"):
             call()
@@ -358,6 +359,6 @@ def test_element_that_a_system_does_not_have_is_told_apart_from_none_at_all():
         ("gap", 3, "there is no stop 3; there are 1, counted from 0"),
     ):
         with pytest.raises(SystemModelError, match=told):
-            continue_orbit(orbit, Parameter(name, index), (1.0, 2.0))
+            continue_branch(orbit, (1.0, 2.0), parameter=Parameter(name, index))
     with pytest.raises(SystemModelError, match="an orbit needs limits, the range of its"):
         continue_branch(orbit, None)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from bilinear import Bilinear
 
-from nldyn import HarmonicForce, Stop, System, continue_branch, continue_orbit, solve_orbit
+from nldyn import HarmonicForce, Stop, System, continue_branch, solve_orbit
 
 SAMPLES = 20000
 GAP, STIFFNESS, DAMPING, NATURAL_HZ = 2e-4, 2e5, 0.03, 10.0
@@ -34,7 +34,7 @@ def by_force():
     guess = np.random.default_rng(0).normal(size=2) * [3e-4, 3e-2]
     start = solve_orbit(between_stops(3.0), 8.4, guess=guess)
     on_branch = continue_branch(start, (7.0, 10.0)).at(8.81599)[1]
-    return continue_orbit(on_branch, "amplitude", (2.5, 6.0))
+    return continue_branch(on_branch, (2.5, 6.0), parameter="amplitude")
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def test_grazing_and_branch_point_are_both_where_the_piecewise_solution_has_them
     """From 5e-12 Hz apart, where rounding decides which comes first; a note tells of it."""
     natural = 2.0 * math.pi * NATURAL_HZ
     oscillator = Bilinear(2.0 * DAMPING * natural, natural**2, STIFFNESS, GAP, force)
-    whole = continue_branch(by_force.at("amplitude", force)[0], RANGE_HZ)
+    whole = continue_branch(by_force.at(force)[0], RANGE_HZ)
     exact = {}
     for start in whole.points[:: len(whole.points) // 2]:
         branch = continue_branch(start, RANGE_HZ)
@@ -166,7 +166,7 @@ def test_grazing_and_branch_point_are_both_where_the_piecewise_solution_has_them
 @pytest.mark.parametrize("force", [5.28234, pytest.param(5.28235, marks=pytest.mark.slow)])
 def test_a_grazing_point_beside_a_branch_point_is_found_once(by_force, force):
     """1e-7 to 6e-6 Hz before the touch, where both lie in steps of their own or in one."""
-    whole = continue_branch(by_force.at("amplitude", force)[0], RANGE_HZ)
+    whole = continue_branch(by_force.at(force)[0], RANGE_HZ)
     for start in whole.points[:: len(whole.points) // 3]:
         branch = continue_branch(start, RANGE_HZ)
         assert sorted(special.kind for special in branch.special_points) == ["BP", "GR", "LP"]

@@ -14,7 +14,6 @@ from nldyn import (
     Unbalance,
     cascade,
     continue_branch,
-    continue_orbit,
     impacts,
     solve_orbit,
 )
@@ -40,10 +39,10 @@ def test_the_impacting_orbit_of_recipes_for_continuation():
     assert 0.8 * hits.speed == pytest.approx([1.36], abs=0.005)
     assert np.radians(hits.phase_deg) == pytest.approx([0.076], abs=0.0005)
     assert orbit.states(np.array([math.pi]))[0] == pytest.approx([-0.98, -0.29], abs=0.005)
-    curve = continue_orbit(orbit, "amplitude", (0.01, 1.05))
-    assert [mark.kind for mark in curve.marks] == ["GR", "LP"]
+    curve = continue_branch(orbit, (0.01, 1.05), parameter="amplitude")
+    assert [special.kind for special in curve.special_points] == ["GR", "LP"]
     shape = OneImpact([[1.0]], [[1.0]], [[0.1]], [1.0], [1.0], 1.0, 0.8)
-    graze, fold = (mark.values[0] for mark in curve.marks)
+    graze, fold = (special.value for special in curve.special_points)
     assert graze == pytest.approx(0.1, rel=1e-10)
     assert fold == pytest.approx(1.0 / shape.reach(1.0, 1), rel=1e-9)
 

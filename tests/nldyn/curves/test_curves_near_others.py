@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
 
 from nldyn import (
     ContinuationOptions,
@@ -14,15 +13,12 @@ from nldyn import (
     Parameter,
     Stop,
     System,
-    SystemModelError,
     continue_branch,
-    continue_orbit,
     continue_special,
     solve_orbit,
 )
 from nldyn.curves.corners import extremes_meet
 from nldyn.curves.point import CurvePoint
-from nldyn.plot.curves import plot_orbit_curve
 
 SECOND = Parameter("natural_frequency_hz", 1)
 
@@ -111,22 +107,6 @@ def test_a_closed_curve_has_each_orbit_once_at_a_value():
     for gap in (1e-3, 1.0001e-3):
         first, last = sorted(orbit.frequency_hz for orbit in curve.at("gap", gap))
         assert last - first > 1.0
-
-
-def test_orbits_over_a_parameter_are_drawn_with_their_special_points():
-    curve = continue_orbit(solve_orbit(bilinear(), 12.2), "gap", (3e-4, 3e-3))
-    kinds = {mark.kind for mark in curve.marks}
-    assert "LP" in kinds
-    ax = plot_orbit_curve(curve)
-    assert ax.get_xlabel() == "gap (mm)"
-    assert ax.get_ylabel().startswith("largest displacement of m (")
-    lines = {line.get_label(): line for line in ax.lines if not line.get_label().startswith("_")}
-    assert {"stable", "unstable", "cyclic fold (LP)"} <= set(lines)
-    assert lines["stable"].get_linestyle() == "-" != lines["unstable"].get_linestyle()
-    assert to_hex(lines["stable"].get_color()) == to_hex(lines["unstable"].get_color())
-    assert lines["cyclic fold (LP)"].get_xdata().size == sum(m.kind == "LP" for m in curve.marks)
-    with pytest.raises(SystemModelError, match="plot_orbit_curve needs a curve in one parameter"):
-        plot_orbit_curve([curve])
 
 
 def test_a_curve_of_grazings_tells_where_its_extreme_vanishes():

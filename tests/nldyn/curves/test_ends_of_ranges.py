@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nldyn import HarmonicForce, RigidStop, Stop, System, continue_orbit, find_orbits, solve_orbit
+from nldyn import HarmonicForce, RigidStop, Stop, System, continue_branch, find_orbits, solve_orbit
 from nldyn.branches.endings import Ending
 
 
@@ -22,24 +22,24 @@ def endings(curve):
 def test_a_dashpot_that_never_pulls_goes_down_to_zero():
     """There it is the linear stop without one."""
     stop = Stop.linear("x", 10.0, gap=0.2, dashpot=0.5, pulls=False)
-    curve = continue_orbit(solve_orbit(single([stop]), 0.3), "dashpot", (0.0, 2.0))
+    curve = continue_branch(solve_orbit(single([stop]), 0.3), (0.0, 2.0), parameter="dashpot")
     assert endings(curve) == [Ending.PARAMETER_RANGE_END] * 2
-    assert [*curve.values[[0, -1], 0]] == [0.0, 2.0]
+    assert [*curve.values[[0, -1]]] == [0.0, 2.0]
     plain = solve_orbit(single([Stop.linear("x", 10.0, gap=0.2)]), 0.3)
-    end = curve.points[0].orbit.max_abs_displacement
+    end = curve.points[0].max_abs_displacement
     assert end == pytest.approx(plain.max_abs_displacement, rel=1e-9)
 
 
 @pytest.mark.parametrize("stops", [[], [RigidStop("x", 0.7, gap=0.0)]])
 def test_orbits_that_shrink_in_proportion_end_at_rest(stops):
     """All of them, forced by F, are F times that of 1 N; the walk on their own scale has no end."""
-    curve = continue_orbit(solve_orbit(single(stops), 0.3), "amplitude", (0.0, 2.0))
+    curve = continue_branch(solve_orbit(single(stops), 0.3), (0.0, 2.0), parameter="amplitude")
     assert endings(curve) == [Ending.SCALES_TO_REST, Ending.PARAMETER_RANGE_END]
     assert len(curve.points) < 40
-    assert not curve.marks
+    assert not curve.special_points
     assert not curve.notes
-    sizes = np.array([point.orbit.max_abs_displacement for point in curve.points])
-    forces = curve.values[:, 0]
+    sizes = np.array([orbit.max_abs_displacement for orbit in curve.points])
+    forces = curve.values
     unit = sizes[-1] / forces[-1]
     np.testing.assert_allclose(sizes, unit * forces, rtol=1e-8)
     assert [forces[0], sizes[0]] == [0.0, 0.0]
@@ -50,12 +50,12 @@ def test_a_range_is_crossed_where_an_impact_stays_long_beside_a_phase_of_shootin
     walls = [RigidStop("x", 0.8, gap=1.0, direction=side) for side in (1, -1)]
     system = single(walls, stiffness=0.01, damping=0.0, amplitude=1.5)
     orbit = next(o for o in find_orbits(system, 0.2, 1) if o.impacts == 3)
-    curve = continue_orbit(orbit, "amplitude", (1.0, 8.0))
+    curve = continue_branch(orbit, (1.0, 8.0), parameter="amplitude")
     other = solve_orbit(system, 0.2, segments=3, guess=orbit.states(np.zeros(1))[0])
-    again = continue_orbit(other, "amplitude", (1.0, 8.0))
+    again = continue_branch(other, (1.0, 8.0), parameter="amplitude")
     for found in (curve, again):
         assert endings(found) == [Ending.PARAMETER_RANGE_END] * 2
-        assert [*found.values[[0, -1], 0]] == [8.0, 8.0]  # it turns on the way
+        assert [*found.values[[0, -1]]] == [8.0, 8.0]  # it turns on the way
     for end in (0, -1):
-        a, b = (found.points[end].orbit.states(np.zeros(1))[0] for found in (curve, again))
+        a, b = (found.points[end].states(np.zeros(1))[0] for found in (curve, again))
         np.testing.assert_allclose(a, b, rtol=1e-8)

@@ -16,7 +16,6 @@ from nldyn import (
     RigidStop,
     System,
     continue_branch,
-    continue_orbit,
     continue_special,
     impacts,
     load,
@@ -136,15 +135,10 @@ def test_a_second_impact_grazes_where_the_closed_form_says(periods, start_hz, be
 
 
 def test_a_curve_goes_on_where_an_impact_passes_a_phase_of_shooting(branch):
-    """The branch again, followed as a curve; both go on across two grazings."""
-    curve = continue_orbit(solve_orbit(oscillator(), 0.27), "frequency_hz", (0.13, 0.4))
-    marks = [(mark.kind, mark.values[0]) for mark in curve.marks]
-    assert [kind for kind, _ in marks] == ["LP", "GR", "PD", "GR"]
-    on_branch = [special.frequency_hz for special in branch.special_points]
-    assert [value for _, value in marks] == pytest.approx(on_branch, rel=1e-10)
-    reasons = {reason.ending for reason in curve.stop_reasons}
-    assert reasons == {Ending.PARAMETER_RANGE_END}
-    assert not curve.notes
+    """It goes on across two grazings."""
+    assert [special.kind for special in branch.special_points] == ["LP", "GR", "PD", "GR"]
+    assert {reason.ending for reason in branch.stop_reasons} == {Ending.RANGE_END}
+    assert not branch.notes
 
 
 def response(hz, ratio=0.5 * DAMPING):
@@ -168,11 +162,11 @@ def test_a_curve_in_any_parameter_goes_on_across_a_grazing(name):
     touch = brentq(room_left, low, high, xtol=1e-15)
     for value in (low, high):
         system = with_value(oscillator(), checked_parameter(oscillator(), name), value)
-        curve = continue_orbit(solve_orbit(system, hz), name, (low, high))
-        (graze,) = [mark for mark in curve.marks if mark.kind == "GR"]
-        assert graze.values[0] == pytest.approx(touch, rel=1e-9)
+        curve = continue_branch(solve_orbit(system, hz), (low, high), parameter=name)
+        (graze,) = [mark for mark in curve.special_points if mark.kind == "GR"]
+        assert graze.value == pytest.approx(touch, rel=1e-9)
         assert {reason.ending for reason in curve.stop_reasons} == {Ending.PARAMETER_RANGE_END}
-        assert {point.orbit.impacts for point in curve.points} == {0, 1}
+        assert {orbit.impacts for orbit in curve.points} == {0, 1}
 
 
 @pytest.mark.parametrize(
@@ -186,10 +180,12 @@ def test_a_grazing_in_the_natural_frequency_is_that_of_the_linear_response(hz, n
         return 1.0 / abs(natural**2 - omega**2 + 1j * DAMPING * natural * omega) - GAP
 
     own = checked_parameter(oscillator(), "natural_frequency_hz")
-    curve = continue_orbit(solve_orbit(with_value(oscillator(), own, natural_hz), hz), own, limits)
-    (graze,) = [mark for mark in curve.marks if mark.kind == "GR"]
-    assert graze.values[0] == pytest.approx(brentq(room_left, *limits, xtol=1e-15), rel=1e-9)
-    assert {point.orbit.impacts for point in curve.points} == {0, 1}
+    curve = continue_branch(
+        solve_orbit(with_value(oscillator(), own, natural_hz), hz), limits, parameter=own
+    )
+    (graze,) = [mark for mark in curve.special_points if mark.kind == "GR"]
+    assert graze.value == pytest.approx(brentq(room_left, *limits, xtol=1e-15), rel=1e-9)
+    assert {orbit.impacts for orbit in curve.points} == {0, 1}
     assert not curve.notes
 
 
@@ -200,11 +196,10 @@ def test_a_ball_that_ceases_to_fly_ends_a_curve_without_a_grazing():
         [[1.0]], [[0.0]], {"x": [1.0]}, stops=[RigidStop("x", 0.0, direction=-1)],
         excitation=[HarmonicForce("x", 1.2 * g), ConstantForce("x", -g)],
     )  # fmt: skip
-    curve = continue_orbit(solve_orbit(ball, 10.0), "amplitude", (0.9 * g, 1.21 * g))
+    curve = continue_branch(solve_orbit(ball, 10.0), (0.9 * g, 1.21 * g), parameter="amplitude")
     assert curve.values.min() == pytest.approx(g, rel=1e-3)
-    assert not curve.marks
-    assert "may be missing" in curve.notes[0]
-    assert curve.stop_reasons[0].ending is Ending.SHORT_STEP
+    assert not curve.special_points
+    assert curve.stop_reasons[0].ending is Ending.FAILS
 
 
 def test_a_curve_goes_on_where_two_stops_are_grazed_at_once():
@@ -212,30 +207,30 @@ def test_a_curve_goes_on_where_two_stops_are_grazed_at_once():
     system = oscillator()
     both = [RigidStop("x", RESTITUTION, GAP, direction) for direction in (1, -1)]
     orbit = solve_orbit(system.with_elements(stops=tuple(both)), 0.45)
-    curve = continue_orbit(orbit, "amplitude", (0.9, 3.0))
-    assert [mark.kind for mark in curve.marks] == ["GR"]
-    assert curve.marks[0].values[0] == pytest.approx(GAP / response(0.45), rel=1e-10)
-    assert {point.orbit.impacts for point in curve.points} == {0, 2}
+    curve = continue_branch(orbit, (0.9, 3.0), parameter="amplitude")
+    assert [mark.kind for mark in curve.special_points] == ["GR"]
+    assert curve.special_points[0].value == pytest.approx(GAP / response(0.45), rel=1e-10)
+    assert {orbit.impacts for orbit in curve.points} == {0, 2}
     assert {reason.ending for reason in curve.stop_reasons} == {Ending.PARAMETER_RANGE_END}
 
 
 def test_orbits_behind_a_grazing_in_the_gap_are_those_of_the_closed_form(tmp_path):
     """They lie on the same side as those without; the curve is extended across it from a file."""
-    short = continue_orbit(solve_orbit(oscillator(), 0.27), "gap", (0.3, 0.8))
+    short = continue_branch(solve_orbit(oscillator(), 0.27), (0.3, 0.8), parameter="gap")
     save(short, tmp_path / "curve.h5")
     (again,) = load(tmp_path / "curve.h5")
-    curve = again.extend([(0.3, 1.5)])
+    curve = continue_branch(again, (0.3, 1.5))
     omega = TURN * 0.27
-    hit = [point for point in curve.points if point.orbit.impacts]
-    slightest = min(impacts(point.orbit).speed[0] for point in hit)
+    hit = [node for node in curve.nodes if node.orbit.impacts]
+    slightest = min(impacts(node.orbit).speed[0] for node in hit)
     assert slightest < 1e-4 * GAP * omega
-    for point in hit:
-        speeds = [motion.speed for motion in exact(float(point.values[0])).motions(omega, 1)]
-        speed = impacts(point.orbit).speed[0]
-        fastest = point.orbit.max_abs_displacement * omega
+    for node in hit:
+        speeds = [motion.speed for motion in exact(node.value).motions(omega, 1)]
+        speed = impacts(node.orbit).speed[0]
+        fastest = node.orbit.max_abs_displacement * omega
         assert min(abs(speed**2 - v**2) for v in speeds) < 1e-10 * fastest**2
-    assert [mark.kind for mark in short.marks] == []
-    assert [mark.kind for mark in curve.marks] == ["LP", "GR"]
+    assert not short.special_points
+    assert [mark.kind for mark in curve.special_points] == ["LP", "GR"]
 
 
 def test_a_curve_of_folds_is_that_of_the_closed_form():
@@ -264,10 +259,10 @@ def test_a_body_at_rest_on_a_stop_grazes_nothing():
     )  # fmt: skip
     orbit = solve_orbit(system, 0.1)
     assert orbit.impacts == 0
-    curve = continue_orbit(orbit, "amplitude", (0.25, 2.2))
-    assert not curve.marks
+    curve = continue_branch(orbit, (0.25, 2.2), parameter="amplitude")
+    assert not curve.special_points
     assert not curve.notes
-    assert [point.orbit.impacts for point in (curve.points[0], curve.points[-1])] == [0, 1]
+    assert [orbit.impacts for orbit in (curve.points[0], curve.points[-1])] == [0, 1]
 
 
 NORMAL_FORMS = {

@@ -226,8 +226,8 @@ def test_what_makes_no_sense_is_refused():
     with pytest.raises(SystemModelError, match="coefficient must be positive"):
         CubicDamper("a", 0.0)
     with pytest.raises(SystemModelError, match="has no such coefficient"):
-        nldyn.continue_orbit(
-            nldyn.solve_orbit(SYSTEMS["hardening"], 0.1), Parameter("k4"), (0.0, 1.0)
+        nldyn.continue_branch(
+            nldyn.solve_orbit(SYSTEMS["hardening"], 0.1), (0.0, 1.0), parameter=Parameter("k4")
         )
 
 

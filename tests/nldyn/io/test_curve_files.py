@@ -5,19 +5,17 @@ from __future__ import annotations
 import h5py
 import numpy as np
 import pytest
-from problems import between_stops, make_one_dof
+from problems import make_one_dof
 
 from nldyn import (
     ContinuationOptions,
     Damper,
     HarmonicForce,
-    Parameter,
     Stop,
     System,
     SystemModelError,
     continue_branch,
     continue_constant,
-    continue_orbit,
     continue_special,
     save,
     solve_orbit,
@@ -63,16 +61,12 @@ def make(kind):
         ranges = ((5.0, 60.0), (0.01, 0.02) if kind == "PD" else (-1e-7, 1e-7))
         return continue_special(found, pair, ranges, options=few)
     start = solve_orbit(one_dof, 26.0)
-    if kind == "orbit":
-        return continue_orbit(start, "frequency_hz", (15.0, 30.0))
     monitor = {"own": force, "max_abs_displacement": "max_abs_displacement"}[kind]
     window = ((25.0, 27.0), (-1e-7, 1e-7))
     return continue_constant(start, monitor, ("frequency_hz", "gap"), window, options=few)
 
 
-@pytest.fixture(
-    scope="module", params=["LP", "PD", "GR", "BP", "orbit", "own", "max_abs_displacement"]
-)
+@pytest.fixture(scope="module", params=["LP", "PD", "GR", "BP", "own", "max_abs_displacement"])
 def curve(request):
     return make(request.param)
 
@@ -139,12 +133,13 @@ def test_an_extended_curve_is_the_curve_through_the_longer_range():
 def test_a_loaded_curve_goes_on(tmp_path):
     few = ContinuationOptions(max_points=3)
     start = solve_orbit(make_one_dof(), 26.0)
-    short = continue_orbit(start, Parameter("stiffness"), (1e9, 2e10), options=few)
+    ranges = ((25.0, 27.0), (-1e-8, 1e-8))
+    short = continue_constant(start, "peak_force", ("frequency_hz", "gap"), ranges, options=few)
     assert "3 points" in short.stop_reasons
     save(short, tmp_path / "short.h5")
-    longer = load_curves(tmp_path / "short.h5")[0].extend([(1e9, 2e10)])
-    assert longer.values[[0, -1], 0] == pytest.approx([1e9, 2e10], rel=1e-14)
-    assert longer.stop_reasons == ("end of the range of stiffness",) * 2
+    longer = load_curves(tmp_path / "short.h5")[0].extend(ranges)
+    assert longer.stop_reasons == ("end of the range of gap",) * 2
+    assert longer.values[[0, -1], 1] == pytest.approx([-1e-8, 1e-8], rel=1e-12)
 
 
 @pytest.mark.parametrize("share", [pytest.param(0.2, marks=pytest.mark.slow), 0.7])
@@ -179,22 +174,21 @@ def test_an_interrupted_curve_is_kept_and_finished(tmp_path, share):
     assert np.array_equal(again.values, done.values) and again.stop_reasons == done.stop_reasons
     few = ContinuationOptions(max_points=2)
     next_flip = special(make_one_dof(), "PD", (12.0, 20.0), 20.0)
-    for other in (
-        continue_special(next_flip, pair, ranges, options=few),
-        continue_orbit(solve_orbit(make_one_dof(), 26.0), "gap", (0.0, 1e-7), options=few),
-    ):
-        with pytest.raises(SystemModelError, match="holds another curve, or more of this one"):
-            other.extend(
-                [(5.0, 60.0), (-1e-7, 2e-7)][-len(other.parameters) :],
-                checkpoint=CheckpointFile(path),
-            )
+    other = continue_special(next_flip, pair, ranges, options=few)
+    with pytest.raises(SystemModelError, match="holds another curve, or more of this one"):
+        other.extend(ranges, checkpoint=CheckpointFile(path))
 
 
 @pytest.mark.parametrize("searched", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch, searched):
-    """A closed 1/3 branch between two equal stops."""
-    orbit = solve_orbit(between_stops(), 11.26, 3, guess=[7.9058e-06, 9.9213e-05])
-    whole = continue_orbit(orbit, "frequency_hz", (11.0, 12.0))
+    """Folds of a bilinear oscillator, in the frequency and the gap."""
+    stop = Stop.linear("m", 15791.0, gap=1e-3)
+    system = System.from_modal(
+        [10.0], {"m": [1.0]}, modal_damping=0.03, stops=[stop], excitation=[HarmonicForce("m", 1.0)]
+    )
+    fold = special(system, "LP", (5.0, 20.0), 8.0)
+    pair, ranges = ("frequency_hz", "gap"), ((3.0, 40.0), (1e-4, 5e-3))
+    whole = continue_special(fold, pair, ranges)
     assert whole.stop_reasons == ("closed curve", "closed curve")
     seen = []
 
@@ -210,10 +204,8 @@ def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
         if searched:
             patched.setattr(curves, "_marked", stop_search)
-        continue_orbit(
-            orbit, "frequency_hz", (11.0, 12.0), progress=stop, checkpoint=CheckpointFile(path)
-        )
-    done = load_curves(path)[0].extend([(11.0, 12.0)])
+        continue_special(fold, pair, ranges, progress=stop, checkpoint=CheckpointFile(path))
+    done = load_curves(path)[0].extend(ranges)
     assert done.stop_reasons == whole.stop_reasons
     length = [curve.points[-1].arclength for curve in (done, whole)]
     assert length[0] == pytest.approx(length[1], rel=0.2)
@@ -226,9 +218,9 @@ def test_an_interrupted_closed_curve_closes_where_it_began(tmp_path, monkeypatch
 
 def test_several_curves_in_one_file_and_what_is_refused(tmp_path):
     path, curve = tmp_path / "curves.h5", make("own")
-    few = continue_orbit(solve_orbit(make_one_dof(), 26.0), "frequency_hz", (25.9, 26.1))
+    few = make("PD")
     save_curves(path, [few, few])
-    assert [c.kind for c in load_curves(path)] == ["orbit", "orbit"]
+    assert [c.kind for c in load_curves(path)] == ["PD", "PD"]
     with pytest.raises(SystemModelError, match="is not a file of branches"):
         load_branches(path)
     with pytest.raises(SystemModelError, match="curves must be a list of curves, got 3"):

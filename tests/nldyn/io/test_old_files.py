@@ -33,3 +33,15 @@ def test_a_curve_of_version_1_has_its_values_and_goes_on():
     assert curve.residuals.max() < 1e-7
     longer = curve.extend([(30.0, 36.0), (-1e-5, 1e-5)])
     assert len(longer.points) > len(curve.points)
+
+
+def test_orbits_over_the_gap_of_version_2_are_a_branch():
+    """At 12.2 Hz; earlier versions wrote them as a curve in one parameter."""
+    (old,) = nldyn.load(DATA / "orbits_over_the_gap_of_version_2.h5")
+    branch = continue_branch(old.points[0], (3e-4, 3e-3), parameter="gap")
+    assert [s.kind for s in old.special_points] == ["LP", "LP", "GR"]
+    values = [[s.value for s in found.special_points] for found in (old, branch)]
+    assert values[0] == pytest.approx(values[1], rel=1e-9)
+    found = [[orbit.max_abs_displacement for orbit in b.at(1e-3)] for b in (old, branch)]
+    assert len(found[0]) == 3
+    assert found[0] == pytest.approx(found[1], rel=1e-9)

@@ -194,15 +194,15 @@ def test_a_disc_is_followed_in_its_speed_as_the_closed_form_says(tmp_path):
     stop = Stop.linear("x", 40.0, gap=0.03)
     system = disc(1.6, [stop])
     exact = touching(0.03) / (2.0 * np.pi)
-    curve = nldyn.continue_orbit(
-        nldyn.solve_orbit(system, system.spin.hz), "speed_hz", (0.25, exact + 1e-5)
+    curve = nldyn.continue_branch(
+        nldyn.solve_orbit(system, system.spin.hz), (0.25, exact + 1e-5), parameter="speed_hz"
     )
     assert len(curve.points) > 2
-    for orbit in (point.orbit for point in curve.points):
+    for orbit in curve.points:
         assert orbit.system.spin.hz == pytest.approx(orbit.frequency_hz, rel=1e-14)
         if not orbit.impacts:
             assert orbit.max_abs_displacement == pytest.approx(whirl(orbit.omega), rel=1e-9)
-    grazing = curve.marks[0]
+    grazing = curve.special_points[0]
     assert grazing.kind == "GR" and grazing.frequency_hz == pytest.approx(exact, rel=1e-9)
     wide = nldyn.continue_special(
         grazing, ("speed_hz", "gap"), ((0.28, 0.286), (0.02, 0.04)),
@@ -211,7 +211,7 @@ def test_a_disc_is_followed_in_its_speed_as_the_closed_form_says(tmp_path):
     assert np.ptp(wide.values[:, 1]) > 1e-4
     for hz, gap in wide.values:
         assert whirl(2.0 * np.pi * hz) == pytest.approx(gap, rel=1e-8)
-    beyond = curve.points[-1].orbit
+    beyond = curve.points[-1]
     assert beyond.impacts == 1
     flow = beyond.problem.flow
     start = flow.to_modal(beyond.problem.nodes(beyond.point)[0])
@@ -226,7 +226,7 @@ def test_a_disc_is_followed_in_its_speed_as_the_closed_form_says(tmp_path):
         assert np.abs(exact_multipliers - multiplier).min() < 1e-5
     nldyn.save(curve, tmp_path / "c.h5")
     (back,) = nldyn.load(tmp_path / "c.h5")
-    assert back.points[-1].orbit.system.spin.hz == beyond.system.spin.hz
+    assert back.points[-1].system.spin.hz == beyond.system.spin.hz
     assert back.values == pytest.approx(curve.values, rel=1e-15)
 
 
@@ -236,7 +236,9 @@ def test_the_speed_ends_where_internal_damping_lets_the_whirl_grow():
     onset = np.sqrt(K / (n / c * (n / c - IP))) / (2.0 * np.pi)
     system = disc(0.9 * 2.0 * np.pi * onset, circulatory=n * SKEW, c=c)
     limits = (0.8 * onset, 1.2 * onset)
-    curve = nldyn.continue_orbit(nldyn.solve_orbit(system, system.spin.hz), "spin_hz", limits)
+    curve = nldyn.continue_branch(
+        nldyn.solve_orbit(system, system.spin.hz), limits, parameter="spin_hz"
+    )
     assert curve.values.max() == pytest.approx(onset, rel=1e-6)
     assert curve.values.min() == pytest.approx(0.8 * onset, rel=1e-9)
 
@@ -281,9 +283,9 @@ def test_spins_that_make_no_sense_are_refused():
         System.from_matrices(np.eye(2), np.eye(2), PLACES, spin=Spin(1.0, np.zeros((3, 3))))
     start = nldyn.solve_orbit(disc(), 0.1)
     with pytest.raises(SystemModelError, match=r"spins at 0\.19.* Hz, but the excitation"):
-        nldyn.continue_orbit(start, "speed_hz", (0.1, 0.2))
+        nldyn.continue_branch(start, (0.1, 0.2), parameter="speed_hz")
     still = nldyn.solve_orbit(rotor(excitation=[Unbalance("x", 0.02)]), 0.1)
     with pytest.raises(SystemModelError, match="'spin_hz': the system has no spin"):
-        nldyn.continue_orbit(still, "spin_hz", (0.1, 0.2))
+        nldyn.continue_branch(still, (0.1, 0.2), parameter="spin_hz")
     with pytest.raises(SceneError, match=r"matrices.spin.gyroscopic must be skew"):
         parse_scene(SPINNING.replace("-0.4", "0.4"))

@@ -108,9 +108,9 @@ def test_a_spring_is_a_parameter():
         excitation=[HarmonicForce("a", 1.0)],
     )  # fmt: skip
     orbit = nldyn.solve_orbit(system, 1.0 / (2.0 * np.pi))
-    family = nldyn.continue_orbit(orbit, Parameter("spring_stiffness"), (1.5, 2.5))
-    k = np.array([point.system.springs[0].stiffness for point in family.orbits])
-    size = np.array([point.max_abs_displacement for point in family.orbits])
+    family = nldyn.continue_branch(orbit, (1.5, 2.5), parameter=Parameter("spring_stiffness"))
+    k = np.array([point.system.springs[0].stiffness for point in family.points])
+    size = np.array([point.max_abs_displacement for point in family.points])
     assert k.min() == pytest.approx(1.5) and k.max() == pytest.approx(2.5)
     assert size == pytest.approx(1.0 / np.hypot(k - 1.0, 0.2), rel=1e-8)
 
