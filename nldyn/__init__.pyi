@@ -24,6 +24,7 @@ from nldyn.base.errors import SceneError as SceneError
 from nldyn.base.errors import SystemModelError as SystemModelError
 
 # bifurcations: special points
+from nldyn.bifurcations.events import Event as Event
 from nldyn.bifurcations.normal_forms import describe_special as describe_special
 from nldyn.bifurcations.normal_forms import normal_form as normal_form
 from nldyn.bifurcations.point import SpecialPoint as SpecialPoint

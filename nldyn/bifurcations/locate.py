@@ -16,11 +16,11 @@ from nldyn.bifurcations.branch_crossing import (
     true_crossing,
 )
 from nldyn.bifurcations.chord import BESIDE, Chord
+from nldyn.bifurcations.kinds import KINDS
 from nldyn.bifurcations.normal_form_coefficients import turns_near_crossing
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import (
-    CRITICAL,
     _on_unit_circle,
     accounted,
     changed,
@@ -88,8 +88,8 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
     sign is not that of a fold, unless a multiplier tells, or the sign does there.
     """
     special = locate(kind, chord, lambda point: tests(point)[kind])
-    critical = CRITICAL.get(kind)
-    if critical and np.abs(special.orbit.multipliers - critical).min() > NEAR_CRITICAL:
+    away = np.abs(special.orbit.multipliers - KINDS[kind].multiplier).min()
+    if away > NEAR_CRITICAL:
         raise LocateError("a test function jumps, as it does from one branch to another")
     if kind == "NS" and not _on_unit_circle(special.orbit.multipliers):
         return []

@@ -20,6 +20,7 @@ from nldyn.base.errors import (
     check_types,
     failing_as,
 )
+from nldyn.bifurcations.kinds import KINDS
 from nldyn.bifurcations.normal_form_coefficients import (
     CoefficientError,
     Coefficients,
@@ -131,7 +132,7 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
     Raises
     ------
     SystemModelError
-        For a kind of point that is none of LP, PD, NS, BP and GR.
+        For a kind of point that is none of LP, PD, NS, BP and GR, and no event of a branch.
 
     References
     ----------
@@ -143,6 +144,8 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
     check_types(others=(others, Sequence))
     for other in others:
         check_special("describe_special: others", other, of_branch=False)
+    if special.kind not in KINDS and isinstance(getattr(special, "point", None), BranchNode):
+        return NormalForm("event", _of_event(special))
     special = on_branch(special)
     if special.kind == "GR":
         return _grazing(special, others)
@@ -159,6 +162,14 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
             "BP": ("Branch point", "branch point"),
         }[special.kind]
         return NormalForm(name, f"{title} at {_hz(special)}: no coefficient can be given, {error}.")
+
+
+def _of_event(special: SpecialPoint) -> str:
+    """What is told of a point that is special by an event."""
+    stability = special.orbit.stability.verdict
+    size = f"{special.orbit.max_abs_displacement:.6g} m"
+    name = special.kind[0].upper() + special.kind[1:]
+    return f"{name} at {special.place(9)}: the orbit is {stability} and reaches {size}."
 
 
 # --- folds ---------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nldyn.base.arrays import Complex
+from nldyn.bifurcations.kinds import KINDS
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.orbits.critical_functions import (
     branch_point_test,
@@ -17,7 +18,6 @@ from nldyn.orbits.orbit import Orbit
 
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
-CRITICAL = {"LP": 1.0, "BP": 1.0, "PD": -1.0}  # multiplier at a special point
 ROUNDED_MODULUS = 1e-6  # error of a multiplier's modulus that may be rounding
 COMPLEX = 1e-6  # share of the imaginary part, above which a multiplier is not real
 
@@ -67,7 +67,7 @@ def accounted(a: Orbit, found: list[SpecialPoint], b: Orbit) -> bool:
             off_circle = np.where(mu.imag == 0.0, np.inf, np.abs(np.abs(mu) - 1.0))
             crossing = np.argsort(off_circle, kind="stable")[:2]
         else:
-            crossing = np.argsort(np.abs(mu - CRITICAL[special.kind]))[:1]
+            crossing = np.argsort(np.abs(mu - KINDS[special.kind].multiplier))[:1]
         size = crossing.size
         others = _possible_outside(np.delete(mu, crossing))
         outside = {n + size for n in others & outside} | {n for n in others if n + size in outside}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_choice, check_types, shown
 from nldyn.base.html_tables import html_table
+from nldyn.bifurcations.events import Event, Events, checked_events, events_along
+from nldyn.bifurcations.kinds import KINDS
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.at_frequency import Places, crossings, passes
 from nldyn.branches.endings import Ending, StopReasons, has_ending
@@ -94,6 +96,8 @@ class Course:
         How many of these were found on the way backward.
     ends : pair of WalkEnd
         How the ways backward and forward would go on; None for a way that there is not.
+    events : tuple of Event
+        What else its special points are, searched when the branch is whole.
     """
 
     limits: tuple[float, float]
@@ -104,6 +108,7 @@ class Course:
     special_points_before: int = 0
     notes_before: int = 0
     ends: tuple[WalkEnd | None, WalkEnd | None] = (None, None)
+    events: tuple[Event, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -247,6 +252,34 @@ class Branch:
             if not any(same_orbit(point.orbit, other) for other in found):
                 found.append(point.orbit)
         return found
+
+    def with_events(self, events: Events) -> Branch:
+        """The same branch, whose special points beside bifurcations and grazings are some events.
+
+        Parameters
+        ----------
+        events : sequence of str, Event or callable
+            As for `continue_branch`.
+
+        Returns
+        -------
+        Branch
+            It goes on with them.
+
+        Raises
+        ------
+        SystemModelError
+            For events that make no sense.
+        """
+        chosen = checked_events(events)
+        special, notes = [s for s in self.special_points if s.kind in KINDS], list(self.notes)
+        for event in chosen:
+            found, lost = events_along(event, self.nodes, closed=self.closed)
+            special += found
+            notes += [note for note in lost if note not in notes]
+        special.sort(key=lambda s: s.point.arclength)
+        course = self.course and replace(self.course, events=chosen)
+        return replace(self, special_points=tuple(special), notes=tuple(notes), course=course)
 
     def table(self, part: Part = "points") -> dict[str, NDArray[Any]]:
         """Columns of numbers, one row per orbit; ``pandas.DataFrame`` takes them as they are.

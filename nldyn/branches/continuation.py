@@ -18,6 +18,8 @@ from nldyn.bifurcations.branch_crossing import (
     same_crossing,
 )
 from nldyn.bifurcations.chord import CROSSING_ERROR
+from nldyn.bifurcations.events import Events, check_values, checked_events
+from nldyn.bifurcations.kinds import KINDS
 from nldyn.bifurcations.normal_form_coefficients import correct_across
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.at_frequency import check_requested, requested
@@ -58,6 +60,7 @@ def continue_branch(
     progress: Callable[[float], None] | None = None,
     open_ends: Sequence[Real] = (),
     at: Sequence[float] | None = None,
+    events: Events | None = None,
     checkpoint: BranchFile | Checkpoint | None = None,
 ) -> Branch:
     """Continue an orbit in both directions through a range of a parameter, or go on with a branch.
@@ -89,6 +92,10 @@ def continue_branch(
     at : sequence of float, optional
         Values at which orbits are wanted: `Branch.requested` has all of them, at each passage of
         the branch. For a branch those of before unless given.
+    events : sequence of str, Event or callable, optional
+        Further special points to mark: "amplitude resonance", "amplitude antiresonance", "phase
+        resonance", an `Event` of your own, or a function of an orbit that is zero there. For a
+        branch those of before unless given.
     checkpoint : CheckpointFile, optional
         File that keeps what is computed, written now and then, at the end, and when an exception
         such as Ctrl-C ends the computation. If it holds this very continuation, that one goes on
@@ -128,7 +135,7 @@ def continue_branch(
     [0.01, 0.02]
     """
     if isinstance(start, Branch):
-        return extended(start, limits, options, at, progress, checkpoint, parameter)
+        return extended(start, limits, options, at, progress, checkpoint, parameter, events)
     if limits is None:
         raise SystemModelError("continue_branch: an orbit needs limits, the range of its parameter")
     check_types(
@@ -146,12 +153,14 @@ def continue_branch(
         options or ContinuationOptions(),
         alike(family, [numbers("open_ends", end) for end in open_ends]),
         check_requested(() if at is None else at, chart),
+        events=checked_events(() if events is None else events),
     )
+    check_values(course.events, start)
     first = start_point(family.place(start), 1.0)
     with checkpoint_at(checkpoint, start.system) as kept:
         known = kept.branch_from(first, course)
         if known is not None:
-            return extended(known, at=at, progress=progress, checkpoint=kept)
+            return extended(known, at=at, progress=progress, checkpoint=kept, events=events)
         return complete(name, None, None, first, course, progress, kept)
 
 
@@ -184,6 +193,7 @@ def extended(
     progress: Callable[[float], None] | None = None,
     checkpoint: BranchFile | Checkpoint | None = None,
     parameter: str | Parameter | None = None,
+    events: Events | None = None,
 ) -> Branch:
     """Finish or extend a branch; see `continue_branch`."""
     course = branch.course
@@ -202,7 +212,9 @@ def extended(
         limits=(chart.low, chart.high),
         options=options or course.options,
         at=check_requested(course.at if at is None else at, chart),
+        events=course.events if events is None else checked_events(events),
     )
+    check_values(new.events, branch.points[0])
     family = branch.nodes[0].family
     branch = on_family(branch, replace(family, charts=(chart,)))
     with checkpoint_at(checkpoint, family.system) as kept:
@@ -310,6 +322,7 @@ def complete(
     points, lost = requested(branch.places, course.at)
     lost = [note for note in lost if note not in branch.notes]
     branch = replace(branch, requested=tuple(points), notes=(*branch.notes, *lost))
+    branch = branch.with_events(course.events)
     checkpoint.work = lambda: branch
     checkpoint.offer()
     return branch
@@ -509,7 +522,8 @@ def _without_first(leg: Leg) -> Leg:
 
 def split(branch: Branch, course: Course) -> tuple[Leg, Leg | None]:
     """The legs of which a branch was joined: forward and, if it was begun, backward."""
-    nodes, special, notes = branch.nodes, branch.special_points, branch.notes
+    nodes, notes = branch.nodes, branch.notes
+    special = [s for s in branch.special_points if s.kind in KINDS]
     start, specials, lines = course.start, course.special_points_before, course.notes_before
     first, last = branch.stop_reasons
     forward = Leg(

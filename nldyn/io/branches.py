@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
+from nldyn.bifurcations.events import event_of
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.branch import Branch, Course, WalkEnd
 from nldyn.branches.checkpoint import Tally
@@ -288,6 +289,8 @@ def _write_course(group: Any, course: Course) -> None:
     set_attribute(group, "start", course.start)
     set_attribute(group, "special_points_before", course.special_points_before)
     set_attribute(group, "notes_before", course.notes_before)
+    if course.events:
+        set_attribute(group, "events", [event.kind for event in course.events])
     _write_options(group, course.options)
     put(group, "at", np.array(course.at, dtype=float), "of the parameter")
     put(group, "open_ends", course.open_ends, UNKNOWNS)
@@ -446,6 +449,7 @@ def _read_course(group: Group, nodes: Sequence[BranchNode]) -> Course:
         group.whole("special_points_before"),
         group.whole("notes_before"),
         (backward, forward),
+        tuple(map(event_of, group.texts("events"))) if group.has_attribute("events") else (),
     )
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from nldyn.base.errors import SystemModelError, check_types, shown
+from nldyn.bifurcations.kinds import kind_of
 from nldyn.curves.curves import Curve
 from nldyn.plot.diagram import (
-    MARKER_NAMES,
     PERIOD_COLOURS,
     length_unit,
     new_axes,
@@ -80,7 +80,7 @@ def plot_curves(curves: Sequence[Curve], ax: Axes | None = None) -> Axes:
     for curve in curves:
         colour = PERIOD_COLOURS[kinds.index(curve.kind) % len(PERIOD_COLOURS)]
         monitor, of, interface = curve.kind.partition(" of ")
-        name = MARKER_NAMES.get(curve.kind) or MONITOR_NAMES.get(monitor, monitor) + of + interface
+        name = MONITOR_NAMES.get(monitor, kind_of(monitor).words) + of + interface
         first = curve is next(c for c in curves if c.kind == curve.kind)
         x, y = (curve.values * scales).T
         ax.plot(x, y, color=colour, lw=1.4, label=name if first else None)

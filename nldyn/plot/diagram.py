@@ -20,6 +20,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
 from nldyn.base.errors import SystemModelError, check_choice, check_types
+from nldyn.bifurcations.kinds import KINDS, kind_of, title_of
 from nldyn.branches.branch import check_branches
 from nldyn.plot.hover import show_labels
 from nldyn.plot.words import (
@@ -53,14 +54,6 @@ PERIOD_COLOURS = (
 )  # fmt: skip
 # a legend beside a diagram
 BESIDE: dict[str, Any] = {"fontsize": "small", "loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
-MARKERS = {"LP": "o", "PD": "s", "NS": "D", "BP": "^", "GR": "x"}
-MARKER_NAMES = {
-    "LP": "cyclic fold",
-    "PD": "flip",
-    "NS": "Neimark-Sacker",
-    "BP": "branch point",
-    "GR": "grazing",
-}
 MANY_MARKS = 60  # special points, of which only those beside stable orbits are marked
 SVG_SALT = "nldyn"
 
@@ -196,7 +189,7 @@ def plot_diagram(
     ax: Axes | None = None,
     *,
     yscale: Literal["linear", "log"] = "linear",
-    special_points: Sequence[str] = tuple(MARKERS),
+    special_points: Sequence[str] | None = None,
     unit: str | None = None,
     direction: str = "",
     references: bool = True,
@@ -213,9 +206,9 @@ def plot_diagram(
         Where to draw; a new figure unless given, which pyplot shows where it is in use.
     yscale : {"linear", "log"}
         Scale of the displacement axis.
-    special_points : sequence of str
-        Kinds to mark, out of LP, PD, NS, BP and GR. Of more than 60 points only those beside a
-        stable orbit are marked, and the legend says how many of how many.
+    special_points : sequence of str, optional
+        Kinds to mark: LP, PD, NS, BP, GR or events; all unless given. Of more than 60 points only
+        those beside a stable orbit are marked, and the legend says how many of how many.
     unit : {"m", "mm", "µm", "nm"}, optional
         Unit of the displacement axis, or of a rotation "rad", "mrad", "µrad" or "nrad"; chosen by
         the largest value unless given.
@@ -253,11 +246,12 @@ def plot_diagram(
     several = getattr(diagram, "branches", diagram)
     branches = list(several if isinstance(several, Iterable) else [several])
     check_branches("diagram", branches)
-    check_types(ax=(ax, Axes, None), special_points=(special_points, Sequence))
+    check_types(ax=(ax, Axes, None), special_points=(special_points, Sequence, None))
     check_choice("yscale", yscale, ("linear", "log"))
     along = followed(branches)
-    for kind in special_points:
-        check_choice("special_points", kind, MARKERS)
+    every = dict.fromkeys([*KINDS, *(s.kind for b in branches for s in b.special_points)])
+    for kind in special_points or ():
+        check_choice("special_points", kind, tuple(every))
     ax = ax if ax is not None else new_axes()
     observed = observed_interface(branches)
     if observed:
@@ -266,7 +260,7 @@ def plot_diagram(
     colours = period_colours(branch.period for branch in branches)
     for branch in branches:
         _draw_branch(ax, branch, colours[branch.period], along, factor)
-    marked = marked_points(branches, special_points)
+    marked = marked_points(branches, every if special_points is None else special_points)
     size = mark_size(sum(len(points) for points in marked.values()))
     for kind, points in marked.items():
         _draw_marks(ax, points, kind, along, factor, size)
@@ -505,7 +499,7 @@ def mark_style(kind: str, size: float = 4.5) -> dict[str, Any]:
     """
     return {
         "linestyle": "none",
-        "marker": MARKERS[kind],
+        "marker": kind_of(kind).marker,
         "markersize": size,
         "markerfacecolor": "white",
         "markeredgecolor": "black",
@@ -524,7 +518,7 @@ def _label_orbits(
 ) -> None:
     """Let special points, which come first, and points show what they are."""
     entries = [
-        (branch.name, f"{MARKER_NAMES[special.kind]} ({special.kind})", special.point)
+        (branch.name, title_of(special.kind), special.point)
         for branch in branches
         for special in branch.special_points
         if special.kind in marked
@@ -578,8 +572,7 @@ def draw_legend(
     for kind, points in marked.items():
         count = sum(p.kind == kind for branch in branches for p in branch.special_points)
         shown = f", {len(points)} of {count}" if len(points) < count else ""
-        label = f"{MARKER_NAMES[kind]} ({kind}){shown}"
-        entries.append(Line2D([], [], label=label, **mark_style(kind)))
+        entries.append(Line2D([], [], label=title_of(kind) + shown, **mark_style(kind)))
     ax.legend(handles=[*entries, *others], **BESIDE)
 
 

@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from nldyn.plot.diagram import MARKERS, PERIOD_COLOURS, file_axes, save_figure
+from nldyn.bifurcations.kinds import KINDS
+from nldyn.plot.diagram import PERIOD_COLOURS, file_axes, save_figure
 from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy
 from nldyn.reduction.model_errors import counted_modes
 from nldyn.report.convergence_page import study_content
@@ -159,7 +160,7 @@ def plot_special_points(study: ConvergenceStudy, title: str = "") -> Axes:
     for row, model in enumerate(followed):
         for kind, colour in (("LP", PERIOD_COLOURS[0]), ("PD", PERIOD_COLOURS[1])):
             places = (model.special_hz or {})[kind]
-            ax.plot(places, [row] * len(places), MARKERS[kind], color=colour, markersize=3.5)
+            ax.plot(places, [row] * len(places), KINDS[kind].marker, color=colour, markersize=3.5)
     ax.set_yticks(range(len(followed)), [f"{m.label}, {counted_modes(m)}" for m in followed])
     ax.tick_params(axis="y", labelsize=8)
     ax.set_xlabel("frequency of folds (circles) and flips (squares) of the harmonic branch (Hz)")

@@ -13,11 +13,12 @@ import numpy.typing as npt
 from fem.render.viewer import packed
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError
+from nldyn.bifurcations.kinds import title_of
 from nldyn.branches.branch import Branch
 from nldyn.orbits.axis import Axis
 from nldyn.orbits.harmonics import harmonics
 from nldyn.orbits.orbit import Orbit
-from nldyn.plot.diagram import MARKER_NAMES, beside_stable, orbit_title, stop_places
+from nldyn.plot.diagram import beside_stable, orbit_title, stop_places
 from nldyn.plot.orbit import FLOOR, drawn_phases, motion_at
 from nldyn.plot.words import Along
 from nldyn.system.naming import stop_name
@@ -129,8 +130,7 @@ def _at_special(branch: Branch, number: int, index: int) -> ChosenOrbit:
     special = branch.special_points[index]
     lengths = [node.arclength for node in branch.nodes]
     after = int(np.searchsorted(lengths, special.point.arclength))
-    name = f"{MARKER_NAMES[special.kind]} ({special.kind})"
-    return ChosenOrbit(number, after - 0.5, name, special.orbit, index)
+    return ChosenOrbit(number, after - 0.5, title_of(special.kind), special.orbit, index)
 
 
 def samples_each(orbits: int) -> int:

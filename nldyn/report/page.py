@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import numpy as np
 import numpy.typing as npt
 
+from nldyn.bifurcations.kinds import KINDS, title_of
 from nldyn.branches.branch import Branch
 from nldyn.plot.diagram import (
     MANY_MARKS,
-    MARKER_NAMES,
     beside_stable,
     branch_curve,
     orbit_text,
@@ -130,6 +130,7 @@ def write_page(
     notes = [*notes, *dict.fromkeys(diagram.notes), *limits(diagram, chosen, kept)]
     samples = samples_each(len(chosen))
     orbits = [orbit_content(each, diagram.axis, along, samples) for each in chosen]
+    kinds = dict.fromkeys([*KINDS, *(s.kind for b in branches for s in b.special_points)])
     content: dict[str, Any] = {
         "title": (scene.title if scene else "") or "Bifurcation diagram",
         "answer": summary.get("answer", []),
@@ -148,7 +149,7 @@ def write_page(
         "notes": notes,
         "branches": drawn_branches(told, kept, along, factor, unit),
         "special": special_marks(told, along, factor, unit),
-        "kinds": MARKER_NAMES,
+        "kinds": {kind: title_of(kind) for kind in kinds},
         "stops": stops_of(branches[0].points[0]) if branches else NO_STOPS,
         "orbits": orbits,
         "tables": {

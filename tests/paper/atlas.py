@@ -14,11 +14,12 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from nldyn.bifurcations.kinds import KINDS
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import broken_off
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.axis import Axis
-from nldyn.plot.diagram import MARKERS, plot_diagram, save_figure
+from nldyn.plot.diagram import plot_diagram, save_figure
 from nldyn.report.results import write_table
 from nldyn.runtime.files import write_whole
 from nldyn.runtime.progress import Progress
@@ -154,7 +155,7 @@ def has_charts(folder: Path) -> bool:
 
 
 COLUMNS = (
-    "model", "starts", "branches", "orbits", *MARKERS, "largest_newton_step",
+    "model", "starts", "branches", "orbits", *KINDS, "largest_newton_step",
     "largest_liouville_error", "indices", "broken_off",
 )  # fmt: skip
 
@@ -204,7 +205,7 @@ def _chart_row(chart: Chart, found: Diagram, folder: Path) -> list[object]:
     errors = [orbit.liouville_error for orbit in orbits]
     return [
         chart.name, len(read_starts(chart.name)), len(found.branches), len(orbits),
-        *(kinds[kind] for kind in MARKERS),
+        *(kinds[kind] for kind in KINDS),
         f"{max((orbit.error for orbit in orbits), default=0.0):.1e}",
         f"{max((e for e in errors if e == e), default=0.0):.1e}",
         found.notes[-1],
