@@ -32,11 +32,12 @@ KINDS = {
     "BP": Kind("branch point", "^", 1.0),
     "GR": Kind("grazing", "x"),
 }
+EVENT_MARKERS = {"phase resonance": "P", "amplitude antiresonance": "v"}
 
 
 def kind_of(name: str) -> Kind:
     """A kind by its name; that of an event is its own words."""
-    return KINDS.get(name) or Kind(name, "*")
+    return KINDS.get(name) or Kind(name, EVENT_MARKERS.get(name, "*"))
 
 
 def title_of(name: str) -> str:

@@ -11,6 +11,7 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.io.checkpoint import CheckpointFile
 from nldyn.orbits.axis import Axis
+from nldyn.orbits.conditions import driving_source
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.scene.build import Structure, build_structure, build_system
 from nldyn.scene.checks import check_computable, check_held_to_follow, remarks
@@ -186,10 +187,15 @@ def _to_follow(scene: Scene, structure: Structure) -> tuple[FlowMap, Continuatio
     with told_as(scene, ("continuation",), SystemModelError):
         if system.bonds:  # searches start where it rests
             rest_positions(system)
+        if "phase resonance" in table.events:
+            driving_source(system)
         return FlowMap(system, FlowOptions(table.rtol)), table, axis
 
 
 def _remarked(scene: Scene, flow: FlowMap, found: Diagram) -> Diagram:
-    """A diagram with notes on what looks like a mistake in the units, or takes long."""
+    """A diagram with its events, and notes on what looks like a mistake in the units."""
+    assert scene.continuation is not None
+    if scene.continuation.events:
+        found = found.with_events(scene.continuation.events)
     said = remarks(scene, flow.system)
     return replace(found, notes=(*found.notes, *said)) if said else found

@@ -854,6 +854,9 @@ class ContinuationTable(Table):
     rtol: Annotated[float, Field(ge=1e-13, le=1e-2)] = 1e-9
     """Relative error to aim at in the motion over a period, 1e-13 to 1e-2; multipliers are
     about ten times less exact."""
+    events: list[Literal["amplitude resonance", "amplitude antiresonance", "phase resonance"]] = []
+    """Further special points to mark: where the largest displacement is extremal along a branch,
+    or where the displacement lags a quarter of a turn behind the only source that swings."""
 
     @field_validator("range_hz", "range")
     @classmethod

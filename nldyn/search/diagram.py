@@ -21,6 +21,7 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.base.html_tables import html_table
+from nldyn.bifurcations.events import Events
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.branches.checkpoint import BranchFile, checkpoint_of_several
 from nldyn.branches.step_control import ContinuationOptions
@@ -158,6 +159,10 @@ class Diagram:
     def of_period(self, period: int) -> list[Branch]:
         """Branches of one period multiple."""
         return [b for b in self.branches if b.period == period]
+
+    def with_events(self, events: Events) -> Diagram:
+        """The same diagram, with some events among the special points: see `Branch.with_events`."""
+        return replace(self, branches=tuple(b.with_events(events) for b in self.branches))
 
     def table(self, part: Part = "points") -> dict[str, NDArray[Any]]:
         """Columns of numbers, one row per orbit, of all branches: see `Branch.table`.

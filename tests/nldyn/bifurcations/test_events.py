@@ -9,6 +9,7 @@ from nldyn import (
     ContinuationOptions,
     Event,
     HarmonicForce,
+    SceneError,
     Stop,
     System,
     SystemModelError,
@@ -19,6 +20,8 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.plot import plot_diagram
+from nldyn.scene.read import parse_scene
+from nldyn.scene.run import compute
 
 RATIO, HZ, FORCE = 0.05, 10.0, 3.0
 RESONANCES = ("amplitude resonance", "phase resonance")
@@ -101,6 +104,36 @@ def test_events_are_saved_told_and_drawn(branch, tmp_path):
     assert describe_special(resonance).startswith("Amplitude resonance at 9.97496")
     labels = {text.get_text() for text in plot_diagram([branch]).get_legend().get_texts()}
     assert {*RESONANCES, "half"} <= labels
+
+
+SCENE = """
+[matrices]
+mass = [[1.0]]
+stiffness = [[100.0]]
+damping = [[1.0]]
+interfaces.x = [1.0]
+[[excitation]]
+at = "x"
+kind = "harmonic"
+amplitude = 1.0
+[continuation]
+range_hz = [1.2, 2.0]
+periods = [1]
+search_points = 1
+events = ["amplitude resonance", "phase resonance"]
+"""
+
+
+def test_a_scene_names_its_events():
+    """ω₀ = 10 rad/s and ζ = 0.05."""
+    (found,) = compute(parse_scene(SCENE)).branches
+    hz = 10.0 / (2.0 * math.pi)
+    assert [s.value for s in found.special_points] == pytest.approx(
+        [hz * math.sqrt(1.0 - 2.0 * 0.05**2), hz], rel=1e-10
+    )
+    two = SCENE + '[[excitation]]\nat = "x"\nkind = "harmonic"\namplitude = 2.0\n'
+    with pytest.raises(SceneError, match="behind one source that swings, but there are 2"):
+        compute(parse_scene(two))
 
 
 def test_an_event_that_jumps_is_a_note():
