@@ -11,7 +11,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError, failing_as
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, SHORTEST_CROSSING
 from nldyn.bifurcations.normal_form_coefficients import correct_across
-from nldyn.bifurcations.point import BranchNode
+from nldyn.bifurcations.point import BranchNode, node_of
 from nldyn.bifurcations.sign_changes import crosses
 from nldyn.orbits.bordered import FREE, Place, Solved, correct
 from nldyn.orbits.conditions import TOUCH, depth_row
@@ -51,7 +51,8 @@ class Chord:
     def row(self) -> Real:
         """Along the secant, or the slope of a touch's depth if that rises or falls all the way."""
         row = self._weights * self._secant
-        if abs(self.last.arclength - self.first.arclength) < TOUCH:
+        short = abs(self.last.arclength - self.first.arclength) < TOUCH
+        if short and self.first.condition is FREE:
             depth = depth_row(self.first)
             ways = self._secant, self.first.tangent, self.last.tangent
             if depth is not None and abs(sum(np.sign(depth @ way) for way in ways)) == len(ways):
@@ -81,7 +82,13 @@ class Chord:
         level = float(row @ (a.point + sigma * self._secant))
         guess = self.between(sigma)
         like = self._nearest(sigma).orbit.motion
-        found = correct(a.family, guess, FREE, row, level, like=like)
+        found = correct(a.family, guess, a.condition, row, level, like=like)
+        length = a.arclength + sigma * (self.last.arclength - a.arclength)
+        if a.condition is not FREE:
+            if not found.converged:
+                raise LocateError(found.failure)
+            self.known[sigma] = node_of(found, self._secant, length)
+            return self.known[sigma]
         beside = found.converged and self._is_beside(found.point - guess)
         crossing = None if beside else self._where_branches_cross(guess, level)
         if crossing is not None:
@@ -95,7 +102,6 @@ class Chord:
                 raise LocateError("the branch turns within one step")
         else:
             raise LocateError(found.failure)
-        length = a.arclength + sigma * (self.last.arclength - a.arclength)
         point = BranchNode.of(place, tangent, length)
         if crosses(self.first, point) and crosses(self.last, point):
             raise LocateError("the branch turns within one step")

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, shown
-from nldyn.orbits.bordered import OrbitFamily, Place
+from nldyn.orbits.bordered import (
+    FREE,
+    Condition,
+    Corrected,
+    Evaluation,
+    OrbitFamily,
+    Place,
+    residual_at,
+)
+from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit, shifted_alike, stroboscopic
 from nldyn.system.chart import told_value, value_of
 from nldyn.system.parameters import Parameter
@@ -34,6 +44,10 @@ class BranchNode:
         Relative arclength from the branch's first computed point.
     tests : dict of str to float
         Test functions, filled when first asked for (see `nldyn.bifurcations.sign_changes.tests`).
+    condition : Condition
+        What the orbits of a curve in two parameters have in common, with borders of this one.
+    corner : str
+        Kind of the mark where a curve has a corner at a grazing point, else empty.
     """
 
     family: OrbitFamily
@@ -42,6 +56,8 @@ class BranchNode:
     tangent: Real
     arclength: float
     tests: dict[str, float] = field(default_factory=dict, repr=False)
+    condition: Condition = FREE
+    corner: str = ""
 
     def __repr__(self) -> str:
         """One line: the orbit and where it is along the branch."""
@@ -58,9 +74,25 @@ class BranchNode:
         family = OrbitFamily.in_frequency(orbit)
         return cls(family, orbit.point, orbit, tangent, arclength)
 
+    @cached_property
+    def at(self) -> Evaluation:
+        """The equations of the family at the point."""
+        return self.family.at(self.point)
+
+    @property
+    def values(self) -> Real:
+        """Values of the parameters."""
+        return self.family.values(self.point)
+
+    @property
+    def residual(self) -> float:
+        """Largest of the relative error of closing, the condition, and an unfolding number."""
+        unfolding = 0.0 if self.family.unfolding is None else abs(float(self.point[-1]))
+        return max(residual_at(self.at, self.condition), unfolding)
+
     @property
     def value(self) -> float:
-        """Value of the parameter."""
+        """Value of the parameter, of several the first."""
         if self.family.in_frequency_alone:
             return self.orbit.frequency_hz
         return float(self.family.values(self.point)[0])
@@ -75,19 +107,32 @@ class BranchNode:
         return replace(self, tangent=-self.tangent, arclength=-self.arclength, tests={})
 
 
+def node_of(found: Corrected, towards: Real, arclength: float, corner: str = "") -> BranchNode:
+    """Point of a branch or curve from a solution, its tangent on the side of a vector."""
+    tangent, condition = found.tangent(towards), found.condition.renewed(found.at)
+    family = found.family
+    if isinstance(condition, Grazing):  # whose rigid stop is passed where the extreme is now
+        family = family.past(condition.passages)
+    return BranchNode(
+        family, found.point, found.orbit, tangent, arclength, condition=condition, corner=corner
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class SpecialPoint:
-    """A located bifurcation or grazing point.
+    """A located bifurcation, grazing point or event, or a mark on a curve in two parameters.
 
     Parameters
     ----------
-    kind : {"LP", "PD", "NS", "BP", "GR"}
-        Cyclic fold, flip, Neimark-Sacker, branch point, grazing.
+    kind : str
+        LP, PD, NS, BP or GR: cyclic fold, flip, Neimark-Sacker, branch point, grazing; on curves
+        also CP, GPD, LPPD, R1 to R4 and pairs, see the theory; or that of an `Event`.
     point : BranchNode
         The orbit at which it happens.
     error : float
         Estimated error of the root in the parameter and the last Newton step, relative; of a
-        parameter that may be zero or negative, relative to the width of its range.
+        parameter that may be zero or negative, relative to the width of its range. Of a mark on a
+        curve that in its arclength.
     """
 
     kind: str
@@ -118,6 +163,21 @@ class SpecialPoint:
         return self.point.value
 
     @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The numbers that were free."""
+        return tuple(chart.parameter for chart in self.point.family.charts)
+
+    @property
+    def values(self) -> Real:
+        """Their values."""
+        return self.point.values
+
+    @property
+    def residual(self) -> float:
+        """Largest of the relative error of closing and the conditions."""
+        return self.point.residual
+
+    @property
     def frequency_error(self) -> float:
         """`error` where the frequency changes; else it is exact."""
         return self.error if self.point.family.in_frequency_alone else 0.0
@@ -129,7 +189,7 @@ class SpecialPoint:
         return self.error * chart.slope(float(self.point.point[-1]))
 
     def place(self, digits: int = 6) -> str:
-        """The value of the parameter, in words."""
+        """The values of the parameters, in words."""
         return place_of(self.point, digits)
 
 
@@ -138,18 +198,28 @@ def on_branch(special: SpecialPoint) -> SpecialPoint:
 
     Then it has no direction.
     """
-    if isinstance(getattr(special, "point", None), BranchNode):
+    if _is_of_branch(special):
         return special
     node = BranchNode.in_frequency(special.orbit, np.zeros(special.orbit.point.size), 0.0)
     return SpecialPoint(special.kind, node, float(getattr(special, "error", 0.0)))
 
 
+def _is_of_branch(special: object) -> bool:
+    """Whether a special point lies on a branch whose direction it knows."""
+    node = getattr(special, "point", None)
+    if not isinstance(node, BranchNode):
+        return False
+    return len(node.family.charts) == 1 and bool(node.tangent.any())
+
+
 def place_of(node: BranchNode, digits: int = 6) -> str:
-    """Where a point of a branch is: the value of its parameter, in words.
+    """Where a point of a branch is: the values of its parameters, in words.
 
     The frequency is told without its name.
     """
-    return told_value(node.parameter, node.value, digits=digits)
+    values = [node.value] if len(node.family.charts) == 1 else node.values.tolist()
+    pairs = zip(node.family.charts, values, strict=True)
+    return ", ".join(told_value(chart.parameter, value, digits=digits) for chart, value in pairs)
 
 
 def check_special(caller: str, special: object, kind: str = "", *, of_branch: bool = True) -> None:
@@ -165,7 +235,7 @@ def check_special(caller: str, special: object, kind: str = "", *, of_branch: bo
         raise SystemModelError(f"{caller} needs a special point, got {shown(special)}")
     if kind and found != kind:
         raise SystemModelError(f"{caller} needs a {kind} point, got {found}")
-    if of_branch and not isinstance(getattr(special, "point", None), BranchNode):
+    if of_branch and not _is_of_branch(special):
         raise SystemModelError(
             f"{caller} needs a special point of a branch, which knows the branch's direction; "
             f"the {found} point at {orbit.frequency_hz:g} Hz was found otherwise"

@@ -9,8 +9,8 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES, SystemModelError
+from nldyn.bifurcations.point import BranchNode, node_of
 from nldyn.branches.step_control import ContinuationOptions
-from nldyn.curves.point import CurvePoint, curve_point
 from nldyn.orbits.bordered import (
     SHORTEST_DIFFERENCE,
     Condition,
@@ -33,7 +33,7 @@ CORNER_STEP = 1e-3  # a step shorter than this may have met a corner
 STRAIGHT_AHEAD = 0.9  # cosine of the way to a corner and the tangent
 
 
-def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePoint]:
+def corner_ahead(here: BranchNode, options: ContinuationOptions) -> list[BranchNode]:
     """The grazing point close ahead at which a curve has a corner, with its tangent behind it.
 
     The derivative of the monodromy matrix jumps at a grazing, and with it the direction of a
@@ -44,10 +44,10 @@ def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePo
         return []
     try:
         grazing = Grazing.of(here.orbit)
-        family = here.found.at.family
+        family = here.family
         linear = here.orbit.system.stops[grazing.stop].is_linear
         if linear:
-            found = _meeting(here.found.at, here.condition, grazing, 10.0 * CORNER_STEP)
+            found = _meeting(here.at, here.condition, grazing, 10.0 * CORNER_STEP)
         else:
             found = correct(family, here.point, Both(here.condition, grazing), max_iterations=25)
         if found is None or not found.converged:
@@ -58,10 +58,13 @@ def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePo
         ahead = float(way @ (weights * here.tangent)) > STRAIGHT_AHEAD * length
         if not (ahead and length < 10.0 * options.grazing_step):
             return []
-        before = float(grazing.value(here.found.at)[0])
+        before = float(grazing.value(here.at)[0])
         condition = here.condition.renewed(found.at)
         kind = f"GR{here.condition.kind}"
-        corner = CurvePoint(found, condition, here.tangent, here.arclength + length, kind)
+        corner = BranchNode(
+            family, found.point, found.orbit, here.tangent, here.arclength + length,
+            condition=condition, corner=kind,
+        )  # fmt: skip
         if linear:
             side = -math.copysign(1.0, before)
             behind = _behind(corner, grazing, side, 2.0 * options.max_step)
@@ -76,10 +79,10 @@ def corner_ahead(here: CurvePoint, options: ContinuationOptions) -> list[CurvePo
 
 
 def _behind(
-    corner: CurvePoint, grazing: Grazing, side: float, farthest: float
-) -> CurvePoint | None:
+    corner: BranchNode, grazing: Grazing, side: float, farthest: float
+) -> BranchNode | None:
     """A point of a curve a little behind a grazing of a linear stop, or None."""
-    at, condition = corner.found.at, corner.condition
+    at, condition = corner.at, corner.condition
     family = at.family
     for depth in BEHIND:
         try:
@@ -95,7 +98,7 @@ def _behind(
         found = correct(family, met.at.point, condition, row, float(row @ met.at.point))
         moved = metric_length(weights, found.at.point - met.at.point)
         if found.converged and moved < CORNER_STEP * length and length < farthest:
-            return curve_point(found, condition, chord, corner.arclength + length)
+            return node_of(found, chord, corner.arclength + length)
     return None
 
 
@@ -139,7 +142,7 @@ def _meeting(
     return None
 
 
-def extremes_meet(here: CurvePoint) -> bool:
+def extremes_meet(here: BranchNode) -> bool:
     """Whether the next extreme of the other kind is as near to zero as the one that grazes."""
     grazing = here.condition
     if not isinstance(grazing, Grazing):

@@ -23,19 +23,15 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.bifurcations.chord import Chord
-from nldyn.bifurcations.point import BranchNode, check_special
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special, node_of
 from nldyn.bifurcations.roots import root
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.continuation import start_point
 from nldyn.branches.endings import Ending, StopReasons, has_ending
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.branches.tables import orbit_columns
-from nldyn.curves.marks import (
-    Located,
-    LocatedPoint,
-    marks_between,
-)
-from nldyn.curves.point import CurvePoint, curve_point, passages
+from nldyn.curves.marks import marks_between
+from nldyn.curves.point import on_charts, passages
 from nldyn.curves.walk import CurveWalk
 from nldyn.flow.flow_map import FlowMap, same_flow
 from nldyn.orbits.bordered import Condition, OrbitFamily, correct, gradient, tangent_surface
@@ -86,9 +82,9 @@ class Curve:
         What the orbits have in common: LP, PD, NS, BP, GR, or the name of a monitor.
     parameters : tuple of Parameter
         What changes.
-    points : tuple of CurvePoint
+    points : tuple of BranchNode
         In order along the curve.
-    marks : tuple of LocatedPoint
+    marks : tuple of SpecialPoint
         Points at which a further condition is met, in the same order.
     stop_reasons : tuple of StopReason
         Why the continuation stopped at the first and at the last point.
@@ -98,8 +94,8 @@ class Curve:
 
     kind: str
     parameters: tuple[Parameter, ...]
-    points: tuple[CurvePoint, ...]
-    marks: tuple[LocatedPoint, ...]
+    points: tuple[BranchNode, ...]
+    marks: tuple[SpecialPoint, ...]
     stop_reasons: StopReasons
     notes: tuple[str, ...] = ()
 
@@ -194,7 +190,7 @@ class Curve:
             chart.check_start(float(column.min()))
             chart.check_start(float(column.max()))
         keeper = _keeper(checkpoint, self)
-        whole = replace(self, points=tuple(point.on_charts(charts) for point in self.points))
+        whole = replace(self, points=tuple(on_charts(point, charts) for point in self.points))
         return _followed(whole, options, progress, keeper)
 
     def at(self, parameter: str | Parameter, value: float) -> list[Orbit]:
@@ -218,7 +214,7 @@ class Curve:
             raise SystemModelError(f"value must be a finite number, got {shown(value)}")
         which = self._index_of(parameter)
         first = self.points[:1] if math.isclose(self.values[0, which], value) else ()
-        found: list[CurvePoint] = []
+        found: list[BranchNode] = []
         for point in (*first, *passages(self.points, which, value)):
             if not any(_same_place(point, other) for other in found):
                 found.append(point)
@@ -244,7 +240,7 @@ def _column_name(parameter: Parameter) -> str:
 
 @shows_progress(of_place("curve"))
 def continue_special(
-    special: Located,
+    special: SpecialPoint,
     parameters: Sequence[str | Parameter],
     ranges: Sequence[tuple[float, float]],
     *,
@@ -259,7 +255,7 @@ def continue_special(
 
     Parameters
     ----------
-    special : SpecialPoint or LocatedPoint
+    special : SpecialPoint
         LP, PD, NS, BP or GR.
     parameters : two of str or Parameter
         See `nldyn.system.chart.checked_parameter`.
@@ -305,7 +301,7 @@ def continue_special(
     return curve
 
 
-def special_start(special: Located, charts: tuple[Chart, ...]) -> CurvePoint:
+def special_start(special: SpecialPoint, charts: tuple[Chart, ...]) -> BranchNode:
     """First point of a curve of special points of a kind, heading up in its first parameter.
 
     Raises
@@ -449,13 +445,13 @@ def _charts(
 
 def _curve(
     kind: str,
-    start: CurvePoint,
+    start: BranchNode,
     options: ContinuationOptions | None,
     progress: Callable[[Real], None] | None,
     keeper: Keeper[Curve],
 ) -> Curve:
     """Walk both ways from the start and mark what is met."""
-    parameters = tuple(chart.parameter for chart in start.found.at.family.charts)
+    parameters = tuple(chart.parameter for chart in start.family.charts)
     open_ = Ending.NOT_FINISHED.told()
     begun = Curve(kind, parameters, (start,), (), (open_, open_))
     return _followed(begun, options, progress, keeper)
@@ -487,7 +483,7 @@ def _is_piece(held: Curve, known: Curve) -> bool:
     """Whether a curve has no points but those of another one."""
     if (held.kind, held.parameters) != (known.kind, known.parameters):
         return False
-    a, b = held.points[0].found.at.family, known.points[0].found.at.family
+    a, b = held.points[0].family, known.points[0].family
     rows = {tuple(row) for row in known.values.tolist()}
     return (
         (a.period, a.segments) == (b.period, b.segments)
@@ -506,8 +502,8 @@ def _followed(
 
     Of one that was not finished all points are searched.
     """
-    forward: list[CurvePoint] = []
-    backward: list[CurvePoint] = []
+    forward: list[BranchNode] = []
+    backward: list[BranchNode] = []
     first, last = curve.stop_reasons
     chosen = options or ContinuationOptions()
 
@@ -557,9 +553,9 @@ def _followed(
     return done
 
 
-def _marked(points: Sequence[CurvePoint]) -> tuple[list[LocatedPoint], list[str]]:
+def _marked(points: Sequence[BranchNode]) -> tuple[list[SpecialPoint], list[str]]:
     """What is met between the points, in order, and what may be missing."""
-    marks: list[LocatedPoint] = []
+    marks: list[SpecialPoint] = []
     notes: list[str] = []
     for a, b in pairwise(points):
         more, lost = marks_between(a, b)
@@ -568,13 +564,13 @@ def _marked(points: Sequence[CurvePoint]) -> tuple[list[LocatedPoint], list[str]
     return marks, notes
 
 
-def _same_place(a: CurvePoint, b: CurvePoint) -> bool:
+def _same_place(a: BranchNode, b: BranchNode) -> bool:
     """Whether two points have the same orbit of the same system."""
     same = np.allclose(a.values, b.values, rtol=SAME_VALUE, atol=0.0)
     return same and same_orbit(a.orbit, b.orbit)
 
 
-def _start(family: OrbitFamily, orbit: Orbit, condition: Condition) -> CurvePoint:
+def _start(family: OrbitFamily, orbit: Orbit, condition: Condition) -> BranchNode:
     """First point of a curve, heading up in its first parameter."""
     guess = family.unknowns(orbit)
     first = family.n_states
@@ -598,4 +594,4 @@ def _start(family: OrbitFamily, orbit: Orbit, condition: Condition) -> CurvePoin
         chart.check_start(value)
     up = np.zeros(guess.size)
     up[first] = 1.0
-    return curve_point(found, condition, up, 0.0)
+    return node_of(found, up, 0.0)

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES, LocateError, check_whole
-from nldyn.bifurcations.point import check_special
+from nldyn.bifurcations.chord import Chord
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import leaves_circle
 from nldyn.bifurcations.touching import Touch, touching_extremes
 from nldyn.curves.codimension_two import is_torus, torus_pair
-from nldyn.curves.point import CurvePoint, between, clear_of_nodes, curve_point
+from nldyn.curves.point import between, clear_of_nodes, curve_tests
 from nldyn.curves.walk import UNFOLDED, is_torus_curve
 from nldyn.orbits.bordered import (
     Condition,
+    Corrected,
     OrbitFamily,
     correct,
     length_unit,
@@ -30,7 +29,6 @@ from nldyn.orbits.conditions import (
     Singular,
     defined_by,
 )
-from nldyn.orbits.orbit import Orbit
 from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, value_of
 from nldyn.system.parameters import Parameter
 
@@ -40,59 +38,14 @@ ALIKE = 1e-6  # share of a step within which touches are those of one orbit by s
 TURNS_BACK = 1e-3  # part of a unit tangent along both parameters, at a cusp
 
 
-class Located(Protocol):
-    """A special point of a branch or of a curve."""
-
-    @property
-    def kind(self) -> str:
-        """LP, PD, NS, BP or GR."""
-
-    @property
-    def orbit(self) -> Orbit:
-        """Its orbit."""
-
-
-@dataclass(frozen=True, eq=False)
-class LocatedPoint:
-    """A special point found by Newton's method, or a point marked on a curve.
-
-    Parameters
-    ----------
-    kind : str
-        LP, PD, NS, BP, GR; on curves also CP, GPD, LPPD, R1 to R4 and pairs, see the theory.
-    orbit : Orbit
-        The orbit.
-    parameters : tuple of Parameter
-        The numbers that were free.
-    values : (n_parameters,) array
-        Their values.
-    residual : float
-        Largest of the relative error of closing and the defining conditions.
-    error : float
-        Relative length of the last step: of Newton's method, or along the curve.
-    """
-
-    kind: str
-    orbit: Orbit
-    parameters: tuple[Parameter, ...]
-    values: Real
-    residual: float
-    error: float
-
-    @property
-    def frequency_hz(self) -> float:
-        """Excitation frequency in Hz."""
-        return self.orbit.frequency_hz
-
-
 def refine_special(
-    special: Located, parameter: str | Parameter = FREQUENCY, *, max_iterations: int = 12
-) -> LocatedPoint:
+    special: SpecialPoint, parameter: str | Parameter = FREQUENCY, *, max_iterations: int = 12
+) -> SpecialPoint:
     """Solve the defining system of a special point by Newton's method in one parameter.
 
     Parameters
     ----------
-    special : SpecialPoint or LocatedPoint
+    special : SpecialPoint
         LP, PD, NS, GR or BP.
     parameter : str or Parameter
         Which number is free: see `nldyn.system.chart.checked_parameter`.
@@ -101,7 +54,8 @@ def refine_special(
 
     Returns
     -------
-    LocatedPoint
+    SpecialPoint
+        It knows no direction of a branch.
 
     Raises
     ------
@@ -132,61 +86,24 @@ def refine_special(
         raise LocateError(
             f"{special.kind} near {orbit.frequency_hz:.6g} Hz was not refined: {found.failure}"
         )
-    values = found.at.values
-    residual = found.residual(condition)
-    if special.kind == "BP":  # an unfolding that stays is a branch point that is none
-        residual = max(residual, abs(float(found.at.point[-1])))
-    return LocatedPoint(special.kind, found.orbit, (chosen,), values, residual, found.step)
+    return SpecialPoint(special.kind, _without_direction(found, 0.0), found.step)
 
 
-@dataclass
-class CurveChord:
-    """The piece of a curve between two neighbouring points, as a function of σ in [0, 1]."""
-
-    first: CurvePoint
-    last: CurvePoint
-
-    def __post_init__(self) -> None:
-        self._known: dict[float, CurvePoint] = {0.0: self.first, 1.0: self.last}
-
-    def at(self, sigma: float) -> CurvePoint:
-        """Point of the curve on the plane through σ of the secant.
-
-        Raises
-        ------
-        LocateError
-            If Newton's method fails there.
-        """
-        sigma = min(max(sigma, 0.0), 1.0)
-        if sigma not in self._known:
-            a, b = self.first, self.last
-            family = a.found.at.family
-            secant = b.point - a.point
-            row = family.metric(a.point) * secant
-            row /= np.linalg.norm(row)
-            level = float(row @ (a.point + sigma * secant))
-            found = correct(family, self._between(sigma), a.condition, row, level)
-            if not found.converged:
-                raise LocateError(found.failure)
-            length = a.arclength + sigma * (b.arclength - a.arclength)
-            self._known[sigma] = curve_point(found, a.condition, secant, length)
-        return self._known[sigma]
-
-    def _between(self, sigma: float) -> Real:
-        """Cubic interpolation of the unknowns between the nearest known points."""
-        below = max(s for s in self._known if s < sigma)
-        above = min(s for s in self._known if s > sigma)
-        x = (sigma - below) / (above - below)
-        return between(self._known[below], self._known[above], x)
+def _without_direction(found: Corrected, arclength: float) -> BranchNode:
+    """A solution of a defining system, of which no branch is followed."""
+    none = np.zeros(found.point.size)
+    return BranchNode(
+        found.family, found.point, found.orbit, none, arclength, condition=found.condition
+    )
 
 
-def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], list[str]]:
+def marks_between(a: BranchNode, b: BranchNode) -> tuple[list[SpecialPoint], list[str]]:
     """What is met between two neighbouring points of a curve, in order, and what may be missing."""
     if not (np.any(a.orbit.point[:-1]) and np.any(b.orbit.point[:-1])):
         return [], []  # from rest on, of which the others are multiples
     a, b = clear_of_nodes(a, b)
-    chord = CurveChord(a, b)
-    found: list[tuple[float, LocatedPoint]] = []
+    chord, span = Chord(a, b), abs(b.arclength - a.arclength)
+    found: list[tuple[float, SpecialPoint]] = []
     notes: list[str] = []
     for name, test in _changes_of_sign(a, b):
         try:
@@ -198,7 +115,7 @@ def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], lis
                     notes.append(_missing(name, a, "its test jumps there"))
                 continue
             if _is_true(name, point):
-                found.append((sigma, _marked(name, point, error * (b.arclength - a.arclength))))
+                found.append((sigma, SpecialPoint(name, point, error * span)))
         except FAILURES as error:
             notes.append(_missing(name, a, error))
     for touches in _touches(a, b):
@@ -207,12 +124,12 @@ def marks_between(a: CurvePoint, b: CurvePoint) -> tuple[list[LocatedPoint], lis
         except FAILURES as error:
             notes.append(_missing(_touch_name(a.condition), a, error))
     if b.corner:
-        found.append((1.0, _marked(b.corner, b, b.found.step)))
+        found.append((1.0, SpecialPoint(b.corner, b, b.orbit.error)))
     found.sort(key=lambda pair: pair[0])
     return [mark for _, mark in found], notes
 
 
-def _touched(touches: Sequence[Touch], chord: CurveChord) -> tuple[float, LocatedPoint]:
+def _touched(touches: Sequence[Touch], chord: Chord) -> tuple[float, SpecialPoint]:
     """Where a stop is touched between two points of a curve.
 
     At a branch point the curve may have a corner there, before which Newton's method on planes
@@ -225,9 +142,9 @@ def _touched(touches: Sequence[Touch], chord: CurveChord) -> tuple[float, Locate
     """
     name, touch = _touch_name(chord.first.condition), touches[0]
     try:
-        sigma, error = root(lambda x: touch.depth(chord.at(x)))  # type: ignore[arg-type]
+        sigma, error = root(lambda x: touch.depth(chord.at(x)))
         length = chord.last.arclength - chord.first.arclength
-        return sigma, _marked(name, chord.at(sigma), error * length)
+        return sigma, SpecialPoint(name, chord.at(sigma), error * abs(length))
     except FAILURES:
         for other in touches:
             met = _met_at_touch(name, chord, other)
@@ -236,10 +153,10 @@ def _touched(touches: Sequence[Touch], chord: CurveChord) -> tuple[float, Locate
         raise
 
 
-def _met_at_touch(name: str, chord: CurveChord, touch: Touch) -> tuple[float, LocatedPoint] | None:
+def _met_at_touch(name: str, chord: Chord, touch: Touch) -> tuple[float, SpecialPoint] | None:
     """The point where a stop is touched, by Newton's method for both conditions."""
     a, b = chord.first, chord.last
-    family, guess = a.found.at.family, between(a, b, _share(touch, a, b))
+    family, guess = a.family, between(a, b, _share(touch, a, b))
     grazing = Grazing(touch.output, touch.is_maximum, touch.phase, length_unit(a.orbit))
     both = Both(a.condition, grazing)
     found = correct(family, guess, both, max_iterations=25)
@@ -249,18 +166,17 @@ def _met_at_touch(name: str, chord: CurveChord, touch: Touch) -> tuple[float, Lo
         return None
     if isinstance(a.condition, BranchPointCondition) and abs(found.at.point[-1]) > UNFOLDED:
         return None
-    parameters = tuple(chart.parameter for chart in family.charts)
-    values, residual = found.at.values, found.residual(both)
-    return sigma, LocatedPoint(name, found.orbit, parameters, values, residual, found.step)
+    length = a.arclength + sigma * (b.arclength - a.arclength)
+    return sigma, SpecialPoint(name, _without_direction(found, length), found.step)
 
 
-def _share(touch: Touch, a: CurvePoint, b: CurvePoint) -> float:
+def _share(touch: Touch, a: BranchNode, b: BranchNode) -> float:
     """Share of the way from a to b at which a stop is touched, by linear interpolation."""
-    before, after = touch.depth(a), touch.depth(b)  # type: ignore[arg-type]
+    before, after = touch.depth(a), touch.depth(b)
     return before / (before - after)
 
 
-def _touches(a: CurvePoint, b: CurvePoint) -> list[list[Touch]]:
+def _touches(a: BranchNode, b: BranchNode) -> list[list[Touch]]:
     """Touches between two points, those together that a symmetry of the structure exchanges."""
     condition = a.condition
     if a.corner or b.corner:
@@ -279,14 +195,15 @@ def _touches(a: CurvePoint, b: CurvePoint) -> list[list[Touch]]:
 
 
 def _changes_of_sign(
-    a: CurvePoint, b: CurvePoint
-) -> list[tuple[str, Callable[[CurvePoint], float]]]:
+    a: BranchNode, b: BranchNode
+) -> list[tuple[str, Callable[[BranchNode], float]]]:
     """Tests that change sign between two points, with the names of what they tell of."""
-    names = [name for name in a.tests if a.tests[name] * b.tests[name] < 0.0]
+    before, after = curve_tests(a), curve_tests(b)
+    names = [name for name in before if before[name] * after[name] < 0.0]
     if not leaves_circle(a.orbit.multipliers, b.orbit.multipliers):
         names = [name for name in names if name not in ("NS", "GRNS")]
     return [
-        (name, lambda point, name=name: point.tests[name])  # type: ignore[misc]
+        (name, lambda point, name=name: curve_tests(point)[name])  # type: ignore[misc]
         for name in names
     ]
 
@@ -299,7 +216,7 @@ def _touch_name(condition: Condition) -> str:
     return f"GR{condition.kind}" if isinstance(condition, Singular) else "GR"
 
 
-def _is_true(name: str, point: CurvePoint) -> bool:
+def _is_true(name: str, point: BranchNode) -> bool:
     """Whether a pair of multipliers is complex where a test tells of one on the unit circle."""
     mu = point.orbit.multipliers
     if name in ("NS", "GRNS"):
@@ -316,15 +233,9 @@ def _is_true(name: str, point: CurvePoint) -> bool:
     return True
 
 
-def _marked(name: str, point: CurvePoint, error: float) -> LocatedPoint:
-    """A mark on a curve."""
-    parameters = tuple(chart.parameter for chart in point.found.at.family.charts)
-    return LocatedPoint(name, point.orbit, parameters, point.values, point.residual, abs(error))
-
-
-def _missing(name: str, point: CurvePoint, why: Exception | str) -> str:
+def _missing(name: str, point: BranchNode, why: Exception | str) -> str:
     """The note that a mark may be missing behind a point."""
-    charts = point.found.at.family.charts
+    charts = point.family.charts
     pairs = zip(charts, point.values.tolist(), strict=True)
     place = ", ".join(f"{chart.parameter.name} = {value:.8g}" for chart, value in pairs)
     return f"{name} near {place} may be missing: {why}"

@@ -12,6 +12,7 @@ from nldyn.base.arrays import SLACK, TINY, Real
 from nldyn.base.errors import FAILURES
 from nldyn.bifurcations.beyond_rigid_grazing import DIFFERENCED, SLIGHTEST
 from nldyn.bifurcations.period_doubling import passed_flip
+from nldyn.bifurcations.point import BranchNode, node_of
 from nldyn.branches.arclength import (
     BESIDE_STEP,
     FARTHEST_OFF,
@@ -27,11 +28,10 @@ from nldyn.curves.codimension_two import cosine_near, is_torus, torus_cosine
 from nldyn.curves.corners import CORNER_STEP, MEETS, corner_ahead, extremes_meet, grazes_linear
 from nldyn.curves.point import (
     NEAR_NODE,
-    CurvePoint,
     clear_of_nodes,
-    curve_point,
     on_chart_plane,
     on_plane,
+    shot_from,
 )
 from nldyn.orbits.bordered import Condition, correct, nearest_depth
 from nldyn.orbits.conditions import BranchPointCondition, Grazing, Held, Singular
@@ -50,7 +50,7 @@ SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)  # of a step that leads over a phase of shoo
 TURN = 0.1
 
 
-def _grazes_rigid(here: CurvePoint, least: float, most: float) -> StopReason | None:
+def _grazes_rigid(here: BranchNode, least: float, most: float) -> StopReason | None:
     """The reason to stop, if the slightest impact with a rigid stop, or nearest miss, is so deep.
 
     Both bounds are shares of the orbit's size; that of a curve of grazings is its own.
@@ -74,22 +74,22 @@ class CurveWalk:
 
     Parameters
     ----------
-    start : CurvePoint
+    start : BranchNode
         First point, yielded first; its tangent gives the direction.
     options : ContinuationOptions
         Step control.
-    origin : CurvePoint, optional
+    origin : BranchNode, optional
         Where the curve closes, in its direction; the start unless given.
     """
 
-    start: CurvePoint
+    start: BranchNode
     options: ContinuationOptions
-    origin: CurvePoint | None = None
+    origin: BranchNode | None = None
     stop_reason: StopReason = field(default_factory=Ending.NOT_FINISHED.told)
     _cosine: float = field(default=math.nan, init=False, repr=False)  # of a pair on the circle
     _obstacle: str = field(default="", init=False, repr=False)
 
-    def __iter__(self) -> Iterator[CurvePoint]:
+    def __iter__(self) -> Iterator[BranchNode]:
         """Walk along the curve."""
         here, step = self.start, self.options.first_step
         curvature = np.zeros(here.tangent.size)
@@ -99,7 +99,7 @@ class CurveWalk:
         if left := self._left_at_once():
             self.stop_reason = Ending.PARAMETER_RANGE_END.told(parameter=left)
             return
-        ahead: list[CurvePoint] = []  # a corner, and what is behind it
+        ahead: list[BranchNode] = []  # a corner, and what is behind it
         before = None
         for _ in range(self.options.max_points):
             rest = before and self._scaled_to_rest(before, here)
@@ -146,8 +146,8 @@ class CurveWalk:
         self.stop_reason = Ending.MOST_POINTS.told(points=self.options.max_points)
 
     def _advance(
-        self, here: CurvePoint, curvature: Real, step: float, seen: bool
-    ) -> tuple[CurvePoint, float, float] | None:
+        self, here: BranchNode, curvature: Real, step: float, seen: bool
+    ) -> tuple[BranchNode, float, float] | None:
         """Next point, also where an impact passes a phase of shooting; see `_straight_on`."""
         attempt = self._straight_on(here, curvature, step, seen)
         if attempt is not None and nodes_to_impacts(attempt[0].orbit) > CLEAR_OF_NODES:
@@ -155,7 +155,7 @@ class CurveWalk:
         if not nodes_to_impacts(here.orbit) < min(NEAR_NODE, FASTEST * step):
             return attempt
         try:
-            shot = here.shot_from(start_far_from_impacts(here.orbit))
+            shot = shot_from(here, start_far_from_impacts(here.orbit))
             none = np.zeros(here.tangent.size)
             for _ in range(MOST_OVER_NODE):
                 first = None
@@ -164,7 +164,7 @@ class CurveWalk:
                     if beyond is None:
                         continue
                     first = first or beyond[0]
-                    there = beyond[0].shot_from(0.0)
+                    there = shot_from(beyond[0], 0.0)
                     if nodes_to_impacts(there.orbit) > CLEAR_OF_NODES:
                         return there, *beyond[1:]
                 if first is None:
@@ -175,14 +175,14 @@ class CurveWalk:
         return attempt
 
     def _straight_on(
-        self, here: CurvePoint, curvature: Real, step: float, seen: bool
-    ) -> tuple[CurvePoint, float, float] | None:
+        self, here: BranchNode, curvature: Real, step: float, seen: bool
+    ) -> tuple[BranchNode, float, float] | None:
         """Next point, its angle to this one and its relative distance from the predictor.
 
         None when the step must be shorter. Where no corner was seen yet, none of a linear stop is
         stepped over: beside it another piece of the curve may lie straight ahead.
         """
-        family = here.found.at.family
+        family = here.family
         weights = family.metric(here.point)
         direction = here.tangent
         straight = here.point + step * direction
@@ -203,7 +203,7 @@ class CurveWalk:
         if miss > self.options.max_miss or off > FARTHEST_OFF * self.options.max_angle * step:
             return None
         try:
-            there = curve_point(found, here.condition, direction, here.arclength + step)
+            there = node_of(found, direction, here.arclength + step)
         except FAILURES:
             return None
         cosine = float(direction @ (weights * there.tangent)) / metric_length(
@@ -225,7 +225,7 @@ class CurveWalk:
                 return None
         return there, angle, miss
 
-    def _why_short(self, here: CurvePoint) -> StopReason:
+    def _why_short(self, here: BranchNode) -> StopReason:
         """Why no step is short enough."""
         if extremes_meet(here):
             return Ending.EXTREME_VANISHES.told()
@@ -243,25 +243,25 @@ class CurveWalk:
     @property
     def _slightest(self) -> float:
         """Slightest impact with a rigid stop that is followed, its depth over the orbit's size."""
-        return SLIGHTEST if self.start.found.at.family.is_exact else DIFFERENCED
+        return SLIGHTEST if self.start.family.is_exact else DIFFERENCED
 
     def _left_at_once(self) -> str:
         """Name of a parameter at the end of its range, beyond which the curve would begin."""
-        charts, start = self.start.found.at.family.charts, self.start
+        charts, start = self.start.family.charts, self.start
         for which, chart in enumerate(charts):
             value = float(start.values[which])
-            slope = float(start.tangent[start.found.at.family.n_states + which])
+            slope = float(start.tangent[start.family.n_states + which])
             if (slope < -ALONG and value <= chart.low) or (slope > ALONG and value >= chart.high):
                 return str(chart.parameter.name)
         return ""
 
-    def _limit_ahead(self, here: CurvePoint, step: float) -> CurvePoint | None:
+    def _limit_ahead(self, here: BranchNode, step: float) -> BranchNode | None:
         """Point at the end of a range, if a failed step would have passed it.
 
         Behind the end there may be no systems: no exponent below 1, no damping below zero.
         """
-        for which, chart in enumerate(here.found.at.family.charts):
-            place = here.found.at.family.n_states + which
+        for which, chart in enumerate(here.family.charts):
+            place = here.family.n_states + which
             slope, limit = float(here.tangent[place]), chart.high
             if slope < 0.0:
                 limit = chart.low
@@ -270,7 +270,7 @@ class CurveWalk:
                 continue
             end = on_plane(here, ahead * here.tangent, ahead, which, chart.coordinate(limit))
             if end is not None:
-                weights = here.found.at.family.metric(here.point)
+                weights = here.family.metric(here.point)
                 off = metric_length(weights, end.point - here.point - ahead * here.tangent)
                 if off <= self.options.max_angle * ahead:
                     self.stop_reason = Ending.PARAMETER_RANGE_END.told(
@@ -279,7 +279,7 @@ class CurveWalk:
                     return end
         return None
 
-    def _scaled_to_rest(self, before: CurvePoint, here: CurvePoint) -> list[CurvePoint] | None:
+    def _scaled_to_rest(self, before: BranchNode, here: BranchNode) -> list[BranchNode] | None:
         """What ends the walk where orbits shrink in proportion to parameters whose ranges end at 0.
 
         They would do so for ever on the scale of their own size. It is rest, but where no orbit of
@@ -304,9 +304,9 @@ class CurveWalk:
         rest = on_plane(here, way, length, int(places[-1]) - family.n_states, 0.0)
         return [] if rest is None else [rest]
 
-    def _end(self, here: CurvePoint, there: CurvePoint) -> list[CurvePoint] | None:
+    def _end(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
         """The last points of the walk if it ends in this step."""
-        charts = here.found.at.family.charts
+        charts = here.family.charts
         ends = []
         for which, chart in enumerate(charts):
             a, b = float(here.values[which]), float(there.values[which])
@@ -339,12 +339,12 @@ class CurveWalk:
             return [there]
         return None
 
-    def _closed(self, a: CurvePoint, b: CurvePoint) -> bool:
+    def _closed(self, a: BranchNode, b: BranchNode) -> bool:
         """Whether the walk from a to b passes the origin, in its direction."""
         origin = self.origin or self.start
         if b.arclength - origin.arclength < 3.0 * (b.arclength - a.arclength):
             return False
-        weights = origin.found.at.family.metric(origin.point)
+        weights = origin.family.metric(origin.point)
         step, way = b.point - a.point, origin.point - a.point
         length2 = float(step @ (weights * step))
         along = float(step @ (weights * way))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +25,10 @@ from nldyn.branches.continuation import make_branch
 from nldyn.branches.endings import StopReason
 from nldyn.branches.tables import UNITS
 from nldyn.curves.curves import Curve
-from nldyn.curves.marks import LocatedPoint
-from nldyn.curves.point import CurvePoint
 from nldyn.flow.flow_map import FlowMap
 from nldyn.io.flow import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
 from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute
-from nldyn.orbits.bordered import FREE, Condition, Corrected, Evaluation, OrbitFamily
+from nldyn.orbits.bordered import FREE, Condition, Evaluation, OrbitFamily
 from nldyn.orbits.conditions import MONITORS, BranchPointCondition, Grazing, Held, Singular
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem
@@ -86,23 +85,19 @@ def load_curves(
 
 def _as_branch(curve: Curve) -> Branch:
     """What an earlier version wrote as a curve of orbits in one parameter."""
-    nodes = [
-        BranchNode(point.family, point.point, point.orbit, point.tangent, point.arclength)
-        for point in curve.points
-    ]
     special = []
     for mark in curve.marks:
-        place = nodes[0].family.place(mark.orbit)
-        near = min(nodes, key=lambda node: distance(node, place))
-        away = float((place.point - near.point) @ (near.family.metric(near.point) * near.tangent))
-        node = BranchNode.of(place, near.tangent, near.arclength + away)
-        special.append(SpecialPoint(mark.kind, node, mark.error))
-    return make_branch("", nodes, special, curve.stop_reasons, list(curve.notes))
+        near = min(curve.points, key=lambda node: distance(node, mark.point))
+        way = near.family.metric(near.point) * (mark.point.point - near.point)
+        length = near.arclength + float(way @ near.tangent)
+        place = replace(mark.point, tangent=near.tangent, arclength=length)
+        special.append(replace(mark, point=place))
+    return make_branch("", list(curve.points), special, curve.stop_reasons, list(curve.notes))
 
 
 def _write_curve(group: Any, curve: Curve) -> None:
     points, marks = curve.points, curve.marks
-    family = points[0].found.at.family
+    family = points[0].family
     for key, value in {
         "kind": curve.kind,
         "parameters": [chart.parameter.name for chart in family.charts],
@@ -125,7 +120,7 @@ def _write_curve(group: Any, curve: Curve) -> None:
     put(group, "point", [point.point for point in points], POINT_UNIT)
     put(group, "tangent", [point.tangent for point in points], "as point")
     put(group, "arclength", [point.arclength for point in points], "1")
-    put(group, "step", [point.found.step for point in points], "1")
+    put(group, "step", [point.orbit.error for point in points], "1")
     condition = group.create_group("condition")
     name = type(points[0].condition).__name__
     set_attribute(condition, "kind", name.removesuffix("Condition"))
@@ -161,17 +156,20 @@ def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve |
     points, tangents = _unknowns(group, "point", family, count), group.array("tangent", count, size)
     lengths, steps = group.array("arclength", count), group.array("step", count)
     conditions = _read_conditions(group, family, count, points, monitor)
-    found = [
-        Corrected(Evaluation(_past(family, condition), point), condition, step, 0, "")
-        for point, condition, step in zip(points, conditions, steps.tolist(), strict=True)
+    numbers = zip(
+        points, conditions, tangents, steps.tolist(), lengths.tolist(), corners, strict=True
+    )
+    nodes = [
+        replace(_node(family, place, condition, step, length), tangent=tangent, corner=corner)
+        for place, condition, tangent, step, length, corner in numbers
     ]
     if len(reasons) != 2 or not count:
         raise group.fault("attribute", "stop_reasons", "must have two entries, of some points")
     curve = Curve(
         group.text("kind"),
         tuple(chart.parameter for chart in family.charts),
-        tuple(map(CurvePoint, found, conditions, tangents, lengths.tolist(), corners)),
-        tuple(_read_marks(group, family, points, conditions)),
+        tuple(nodes),
+        tuple(_read_marks(group, family, nodes)),
         (StopReason(reasons[0]), StopReason(reasons[1])),
         tuple(group.texts("notes")),
     )
@@ -204,23 +202,27 @@ def _read_family(group: Group, laws: Laws) -> OrbitFamily:
 
 
 def _read_marks(
-    group: Group, family: OrbitFamily, points: Real, conditions: Sequence[Condition]
-) -> Iterator[LocatedPoint]:
+    group: Group, family: OrbitFamily, nodes: Sequence[BranchNode]
+) -> Iterator[SpecialPoint]:
     """The marks, each with the orbit by the condition of the point of the curve nearest to it."""
     kinds = group.texts("marks")
     places = _unknowns(group, "mark_point", family, len(kinds))
-    residuals, errors = (group.array(f"mark_{name}", len(kinds)) for name in ("residual", "error"))
-    parameters = tuple(chart.parameter for chart in family.charts)
-    numbers = zip(kinds, places, residuals.tolist(), errors.tolist(), strict=True)
-    for kind, place, residual, error in numbers:
-        nearest = conditions[int(np.argmin(np.abs(points - place).max(axis=1)))]
-        orbit = Evaluation(_past(family, nearest), place).make_orbit(error)
-        yield LocatedPoint(kind, orbit, parameters, family.values(place), residual, error)
+    errors = group.array("mark_error", len(kinds)).tolist()
+    points = np.array([node.point for node in nodes])
+    for kind, place, error in zip(kinds, places, errors, strict=True):
+        nearest = nodes[int(np.argmin(np.abs(points - place).max(axis=1)))]
+        node = _node(family, place, nearest.condition, error, nearest.arclength)
+        yield SpecialPoint(kind, node, error)
 
 
-def _past(family: OrbitFamily, condition: Condition) -> OrbitFamily:
-    """The family with the rigid stop that a grazing passes."""
-    return family.past(condition.passages) if isinstance(condition, Grazing) else family
+def _node(
+    family: OrbitFamily, place: Real, condition: Condition, error: float, arclength: float
+) -> BranchNode:
+    """A point of a curve without direction, the rigid stop passed that a grazing passes."""
+    if isinstance(condition, Grazing):
+        family = family.past(condition.passages)
+    orbit = Evaluation(family, place).make_orbit(error)
+    return BranchNode(family, place, orbit, np.zeros(place.size), arclength, condition=condition)
 
 
 def _read_conditions(

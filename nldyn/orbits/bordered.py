@@ -575,10 +575,14 @@ class Corrected:
 
     def residual(self, condition: Condition) -> float:
         """Largest of the relative error of closing and the condition."""
-        family = self.at.family
-        closing = float(np.linalg.norm(self.at.residual))
-        closing /= math.sqrt(family.segments) * family.scale(self.at.point)
-        return max(closing, float(np.abs(condition.value(self.at)).max(initial=0.0)))
+        return residual_at(self.at, condition)
+
+
+def residual_at(at: Evaluation, condition: Condition) -> float:
+    """Largest of the relative error of closing and a condition."""
+    closing = float(np.linalg.norm(at.residual))
+    closing /= math.sqrt(at.family.segments) * at.family.scale(at.point)
+    return max(closing, float(np.abs(condition.value(at)).max(initial=0.0)))
 
 
 FREE = Free()

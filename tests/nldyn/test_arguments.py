@@ -214,9 +214,7 @@ def test_what_is_no_branch_or_curve_cannot_be_drawn(harmonic_branch, orbit):
     for name in ("yscale", "unit"):
         said = refused(lambda x, name=name: plot_diagram([harmonic_branch], **{name: x}), *axes)
         check_named(said, f"{name} must be one of")
-    said = refused(
-        lambda x: plot_diagram([harmonic_branch], special_points=x), None, 3, ["XX"], [3]
-    )
+    said = refused(lambda x: plot_diagram([harmonic_branch], special_points=x), 3, ["XX"], [3])
     check_named(said, "special_points must be")
     check_named(
         refused(lambda x: curve.at("frequency_hz", x), *junk[:-3]), "value must be a finite number"

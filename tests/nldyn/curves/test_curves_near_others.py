@@ -17,8 +17,8 @@ from nldyn import (
     continue_special,
     solve_orbit,
 )
+from nldyn.curves import marks
 from nldyn.curves.corners import extremes_meet
-from nldyn.curves.point import CurvePoint
 
 SECOND = Parameter("natural_frequency_hz", 1)
 
@@ -130,7 +130,7 @@ def test_a_change_of_sign_at_a_jump_is_a_note_and_no_mark(harmonic, monkeypatch)
     fold = next(p for p in harmonic.special_points if p.kind == "LP")
     options = ContinuationOptions(max_points=3)
     monkeypatch.setattr(
-        CurvePoint, "tests", property(lambda point: {"R1": -1.0 if point.arclength < 0 else 1.0})
+        marks, "curve_tests", lambda point: {"R1": -1.0 if point.arclength < 0 else 1.0}
     )
     window = ((4.0, 45.0), (1e-4, 2e-3))
     curve = continue_special(fold, ("frequency_hz", "gap"), window, options=options)
