@@ -31,13 +31,13 @@ from nldyn.bifurcations.point import SpecialPoint as SpecialPoint
 from nldyn.bifurcations.switching import switch_branch as switch_branch
 
 # branches: families of orbits in the frequency
-from nldyn.branches.backbone import backbone as backbone
 from nldyn.branches.branch import Branch as Branch
 from nldyn.branches.cascades import cascade as cascade
 from nldyn.branches.continuation import continue_branch as continue_branch
 from nldyn.branches.step_control import ContinuationOptions as ContinuationOptions
 
-# curves: families in any one or two parameters
+# curves: families in two parameters, and of free motions
+from nldyn.curves.backbone import backbone as backbone
 from nldyn.curves.curves import continue_constant as continue_constant
 from nldyn.curves.curves import continue_special as continue_special
 from nldyn.curves.resonances import phase_resonance as phase_resonance

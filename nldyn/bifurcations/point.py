@@ -18,7 +18,7 @@ from nldyn.orbits.bordered import (
     Place,
     residual_at,
 )
-from nldyn.orbits.conditions import Grazing
+from nldyn.orbits.conditions import Grazing, Phase
 from nldyn.orbits.orbit import Orbit, shifted_alike, stroboscopic
 from nldyn.system.chart import told_value, value_of
 from nldyn.system.parameters import Parameter
@@ -113,6 +113,8 @@ def node_of(found: Corrected, towards: Real, arclength: float, corner: str = "")
     family = found.family
     if isinstance(condition, Grazing):  # whose rigid stop is passed where the extreme is now
         family = family.past(condition.passages)
+    elif isinstance(condition, Phase):  # fed by what makes it larger
+        family = family.unfolded(family.from_origin(found.point))
     return BranchNode(
         family, found.point, found.orbit, tangent, arclength, condition=condition, corner=corner
     )

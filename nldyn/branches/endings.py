@@ -19,6 +19,8 @@ class Ending(Enum):
     NOT_FINISHED = "not finished"
     RANGE_END = "end of the frequency range"
     NO_ORBIT_AT_RANGE_END = "end of the range of {parameter}, where no orbit was found"
+    AMPLITUDE_RANGE_END = "end of the range of amplitudes"
+    BEGINS_AT = "begins at an amplitude of {place}"
     PARAMETER_RANGE_END = "end of the range of {parameter}"
     SCALES_TO_REST = "the orbits shrink in proportion to {parameter}, to rest where it is zero"
     CLOSED_BRANCH = "closed branch"

@@ -82,6 +82,8 @@ class OrbitFamily:
         Direction that is added to the shooting equations, times one more unknown.
     passages : tuple of Passage
         Where rigid stops let the motions pass.
+    origin : (N,) array, optional
+        States from which the size of orbits counts; zero unless given.
     """
 
     problem: ShootingProblem
@@ -90,6 +92,7 @@ class OrbitFamily:
     charts: tuple[Chart, ...]
     unfolding: Real | None = None
     passages: tuple[Passage, ...] = ()
+    origin: Real | None = None
 
     @classmethod
     def around(cls, orbit: Orbit, charts: tuple[Chart, ...]) -> OrbitFamily:
@@ -232,8 +235,12 @@ class OrbitFamily:
 
     def scale(self, point: Real) -> float:
         """Root mean square of the states: the unit of relative lengths."""
-        states = point[: self.n_states]
+        states = point[: self.n_states] if self.origin is None else self.from_origin(point)
         return math.sqrt(float(states @ states) / self.segments) or 1.0
+
+    def from_origin(self, point: Real) -> Real:
+        """States (N,) counted from the origin."""
+        return point[: self.n_states] - (0.0 if self.origin is None else self.origin)
 
     def metric(self, point: Real) -> Real:
         """Weights g of the arclength ds² = Σ g Δ², relative in the states."""

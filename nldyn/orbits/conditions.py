@@ -28,6 +28,7 @@ from nldyn.orbits.harmonics import line_by_balance
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.passage import Passage, peak_past
 from nldyn.orbits.shooting import metric_length
+from nldyn.system.equilibrium import constant_force, force_at
 from nldyn.system.loads import BaseMotion, ConstantForce, HarmonicForce, Unbalance
 from nldyn.system.system import System
 
@@ -639,6 +640,43 @@ class Held:
     def renewed(self, at: Evaluation) -> Held:
         """The same."""
         return self
+
+
+@dataclass(frozen=True, eq=False)
+class Phase:
+    """A free motion begins on the plane across the path of another one, where that begins.
+
+    Parameters
+    ----------
+    begin : (2n,) array
+        First state of the other.
+    path : (2n,) array
+        Its rate of change there, over its length and the size of the orbit.
+    """
+
+    begin: Real
+    path: Real
+
+    @classmethod
+    def of(cls, at: Evaluation) -> Phase:
+        """The condition by the motion of a point."""
+        flow, begin = at.problem.flow, at.nodes[0]
+        q, v = np.split(flow.to_modal(begin), 2)
+        force = force_at(flow.system, constant_force(flow.system), q)
+        rate = flow.to_state(np.append(v, -force))
+        return cls(begin, rate / (np.linalg.norm(rate) * at.family.scale(at.point)))
+
+    def value(self, at: Evaluation) -> Real:
+        """Relative distance of the first state from the plane, shape (1,)."""
+        return np.array([self.path @ (at.nodes[0] - self.begin)])
+
+    def reach(self, at: Evaluation) -> float:
+        """Any, as it is linear."""
+        return DIFFERENCE
+
+    def renewed(self, at: Evaluation) -> Phase:
+        """The same with the path of another motion."""
+        return Phase.of(at)
 
 
 def nearest_crossing(place: Place, longest: float = math.inf) -> tuple[Solved, float] | None:

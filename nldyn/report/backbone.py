@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from nldyn.branches.backbone import Backbone, farthest_from
+from nldyn.curves.backbone import Backbone, farthest_from
 from nldyn.curves.curves import Curve
 from nldyn.plot.diagram import PERIOD_COLOURS, file_axes, save_figure
 from nldyn.plot.words import axis_unit, units_in

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TypeVar
 
 from nldyn.base.errors import SystemModelError
-from nldyn.branches.backbone import Backbone, backbone
 from nldyn.branches.step_control import ContinuationOptions
+from nldyn.curves.backbone import Backbone, backbone
 from nldyn.curves.curves import Curve
 from nldyn.curves.resonances import phase_resonance, strength_of
 from nldyn.orbits.conditions import driving_source
