@@ -34,7 +34,13 @@ from nldyn.bifurcations.normal_form_coefficients import (
     loop_of,
     torus,
 )
-from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special, on_branch
+from nldyn.bifurcations.point import (
+    BranchNode,
+    SpecialPoint,
+    check_special,
+    is_of_branch,
+    on_branch,
+)
 from nldyn.bifurcations.rigid_grazing import RigidGrazing, RootMap, turned
 from nldyn.bifurcations.rigid_touch import Touches
 from nldyn.orbits.bordered import FREE, Place, correct
@@ -144,7 +150,7 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
     check_types(others=(others, Sequence))
     for other in others:
         check_special("describe_special: others", other, of_branch=False)
-    if special.kind not in KINDS and isinstance(getattr(special, "point", None), BranchNode):
+    if special.kind not in KINDS and is_of_branch(special):
         return NormalForm("event", _of_event(special))
     special = on_branch(special)
     if special.kind == "GR":

@@ -200,13 +200,13 @@ def on_branch(special: SpecialPoint) -> SpecialPoint:
 
     Then it has no direction.
     """
-    if _is_of_branch(special):
+    if is_of_branch(special):
         return special
     node = BranchNode.in_frequency(special.orbit, np.zeros(special.orbit.point.size), 0.0)
     return SpecialPoint(special.kind, node, float(getattr(special, "error", 0.0)))
 
 
-def _is_of_branch(special: object) -> bool:
+def is_of_branch(special: object) -> bool:
     """Whether a special point lies on a branch whose direction it knows."""
     node = getattr(special, "point", None)
     if not isinstance(node, BranchNode):
@@ -237,7 +237,7 @@ def check_special(caller: str, special: object, kind: str = "", *, of_branch: bo
         raise SystemModelError(f"{caller} needs a special point, got {shown(special)}")
     if kind and found != kind:
         raise SystemModelError(f"{caller} needs a {kind} point, got {found}")
-    if of_branch and not _is_of_branch(special):
+    if of_branch and not is_of_branch(special):
         raise SystemModelError(
             f"{caller} needs a special point of a branch, which knows the branch's direction; "
             f"the {found} point at {orbit.frequency_hz:g} Hz was found otherwise"
