@@ -24,12 +24,20 @@ from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import make_branch
 from nldyn.branches.endings import StopReason
 from nldyn.branches.tables import UNITS
+from nldyn.curves.backbone import Backbone
 from nldyn.curves.curves import Curve
 from nldyn.flow.flow_map import FlowMap
 from nldyn.io.flow import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
 from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute
 from nldyn.orbits.bordered import FREE, Condition, Evaluation, OrbitFamily
-from nldyn.orbits.conditions import MONITORS, BranchPointCondition, Grazing, Held, Singular
+from nldyn.orbits.conditions import (
+    MONITORS,
+    BranchPointCondition,
+    Grazing,
+    Held,
+    Phase,
+    Singular,
+)
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem
 from nldyn.system.chart import FREQUENCY, Chart, checked_parameter
@@ -69,10 +77,27 @@ def save_curves(path: str | Path, curves: Sequence[Curve]) -> None:
             _write_curve(groups.create_group(f"{number:04d}"), curve)
 
 
+def save_backbone(path: str | Path, found: Backbone) -> None:
+    """Write a backbone to a file, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    with new_file(path, FORMAT, FORMAT_VERSION) as file:
+        group = file.create_group("curves").create_group("0000")
+        _write_curve(group, found.curve)
+        set_attribute(group, "mode", found.mode)
+
+
 def load_curves(
     path: str | Path, *, laws: Laws | None = None, monitor: OwnMonitor | None = None
-) -> list[Curve | Branch]:
-    """Read all curves of a file, and branches that were written as such; see `nldyn.load`.
+) -> list[Curve | Branch | Backbone]:
+    """Read all curves of a file, a backbone, and branches that were written as curves.
+
+    See `nldyn.load`.
+
 
     Their orbits are made of their unknowns when they are asked for, by the flow map.
     """
@@ -115,8 +140,9 @@ def _write_curve(group: Any, curve: Curve) -> None:
     write_flow(group.create_group("flow_map"), FlowMap(family.system, family.options))
     charts = [(c.parameter.index, c.low, c.high) for c in family.charts]
     put(group, "ranges", np.array(charts, dtype=float), "index, then those of the parameters")
-    if family.unfolding is not None:
-        put(group, "unfolding", family.unfolding, STATE_UNIT)
+    for name in ("unfolding", "origin"):
+        if getattr(family, name) is not None:
+            put(group, name, getattr(family, name), STATE_UNIT)
     put(group, "point", [point.point for point in points], POINT_UNIT)
     put(group, "tangent", [point.tangent for point in points], "as point")
     put(group, "arclength", [point.arclength for point in points], "1")
@@ -144,11 +170,14 @@ def _numbers_of(condition: Condition) -> dict[str, Any]:
         BranchPointCondition: ("left", "right", "unit"),
         Grazing: ("stop", "is_maximum", "phase", "unit", "half", "every"),
         Held: ("target",),
+        Phase: ("begin", "path"),
     }[type(condition)]
     return {name: getattr(condition, name) for name in names}
 
 
-def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve | Branch:
+def _read_curve(
+    group: Group, laws: Laws, monitor: OwnMonitor | None
+) -> Curve | Branch | Backbone:
     family = _read_family(group, laws)
     size = family.n_states + family.n_free
     corners, reasons = group.texts("corners"), group.texts("stop_reasons")
@@ -173,6 +202,8 @@ def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve |
         (StopReason(reasons[0]), StopReason(reasons[1])),
         tuple(group.texts("notes")),
     )
+    if group.has_attribute("mode"):
+        return Backbone(curve, group.whole("mode"))
     return _as_branch(curve) if conditions[0] is FREE else curve
 
 
@@ -197,7 +228,9 @@ def _read_family(group: Group, laws: Laws) -> OrbitFamily:
     problem = ShootingProblem(flow, group.whole("period"), group.whole("segments"))
     family = OrbitFamily(problem, group.text("observe"), group.number("frequency_hz"), charts)
     if "unfolding" in group:
-        return family.unfolded(group.array("unfolding", family.n_states))
+        family = family.unfolded(group.array("unfolding", family.n_states))
+    if "origin" in group:
+        family = replace(family, origin=group.array("origin", family.n_states))
     return family
 
 
@@ -221,6 +254,8 @@ def _node(
     """A point of a curve without direction, the rigid stop passed that a grazing passes."""
     if isinstance(condition, Grazing):
         family = family.past(condition.passages)
+    elif isinstance(condition, Phase):
+        family = family.unfolded(family.from_origin(place))
     orbit = Evaluation(family, place).make_orbit(error)
     return BranchNode(family, place, orbit, np.zeros(place.size), arclength, condition=condition)
 
@@ -232,6 +267,9 @@ def _read_conditions(
     kind, of = group.text("kind"), curve.text("kind")
     if kind == "Free":
         return [FREE] * count
+    if kind == "Phase":
+        size = family.problem.size
+        return list(map(Phase, group.array("begin", count, size), group.array("path", count, size)))
     if kind == "BranchPoint":
         left, unit = group.array("left", count, n), group.array("unit", count, n + 1)
         return list(map(BranchPointCondition, left, group.array("right", count, 2, n + 1), unit))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from nldyn.base.errors import SystemModelError, shown
 from nldyn.branches.branch import Branch
+from nldyn.curves.backbone import Backbone
 from nldyn.curves.curves import Curve
 from nldyn.io import branches as branch_files
 from nldyn.io import curves as curve_files
@@ -18,14 +19,14 @@ from nldyn.io.branches import (
     save_diagram,
     save_exploration,
 )
-from nldyn.io.curves import load_curves, save_curves
+from nldyn.io.curves import load_curves, save_backbone, save_curves
 from nldyn.io.flow import Laws
 from nldyn.io.hdf5 import kind_of
 from nldyn.orbits.orbit import Orbit
 from nldyn.search.diagram import Diagram
 from nldyn.search.exploration import Exploration
 
-Result = Branch | Diagram | Exploration | Curve
+Result = Branch | Diagram | Exploration | Curve | Backbone
 
 
 def save(result: Result | Sequence[Branch] | Sequence[Curve], path: str | Path) -> None:
@@ -33,7 +34,7 @@ def save(result: Result | Sequence[Branch] | Sequence[Curve], path: str | Path) 
 
     Parameters
     ----------
-    result : Branch, Diagram, Exploration or Curve, or a list of branches or of curves
+    result : Branch, Diagram, Exploration, Curve or Backbone, or a list of branches or of curves
         What to write, to the last digit.
     path : str or Path
         The file.
@@ -64,6 +65,8 @@ def save(result: Result | Sequence[Branch] | Sequence[Curve], path: str | Path) 
         save_diagram(path, result)
     elif isinstance(result, Branch):
         save_branches(path, [result])
+    elif isinstance(result, Backbone):
+        save_backbone(path, result)
     elif isinstance(result, Curve):
         save_curves(path, [result])
     elif _all(result, Branch):
@@ -72,8 +75,8 @@ def save(result: Result | Sequence[Branch] | Sequence[Curve], path: str | Path) 
         save_curves(path, result)  # type: ignore[arg-type]
     else:
         raise SystemModelError(
-            "save: the result must be a branch, a diagram, an exploration, a curve, or a list of "
-            f"branches or of curves, got {shown(result)}"
+            "save: the result must be a branch, a diagram, an exploration, a curve, a backbone, or "
+            f"a list of branches or of curves, got {shown(result)}"
         )
 
 
@@ -91,7 +94,7 @@ def load(
     *,
     laws: Laws | None = None,
     monitor: Callable[[Orbit], float] | None = None,
-) -> Diagram | Exploration | list[Branch] | list[Curve | Branch]:
+) -> Diagram | Exploration | list[Branch] | list[Curve | Branch | Backbone]:
     """Read what `save` wrote, or what a running computation keeps; the file knows its kind.
 
     Parameters
@@ -105,7 +108,7 @@ def load(
 
     Returns
     -------
-    Diagram, Exploration, list of Branch or list of Curve
+    Diagram, Exploration, list of Branch or list of Curve, or of one Backbone
         With the numbers of what was saved; branches and curves go on as those could.
 
     Raises

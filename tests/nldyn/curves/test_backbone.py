@@ -13,6 +13,8 @@ from nldyn import (
     System,
     SystemModelError,
     backbone,
+    load,
+    save,
 )
 
 
@@ -53,6 +55,17 @@ def test_a_backbone_in_a_well_counts_from_its_bottom():
     far = np.sqrt(2.0 - (1.0 - found.amplitude) ** 2)
     exact = far / (2.0 * np.sqrt(2.0) * ellipk(2.0 - 2.0 / far**2))
     assert found.frequency_hz == pytest.approx(exact, rel=1e-9)
+
+
+def test_a_backbone_is_saved(tmp_path):
+    system = oscillator(springs=[PolynomialSpring("x", [0.0, 0.0, 1.0])])
+    found = backbone(system, amplitude_m=(0.1, 0.5))
+    save(found, tmp_path / "backbone.h5")
+    (again,) = load(tmp_path / "backbone.h5")
+    assert repr(again) == repr(found)
+    assert np.array_equal(again.frequency_hz, found.frequency_hz)
+    assert again.energy == pytest.approx(found.energy, rel=1e-14)
+    assert again.amplitude == pytest.approx(found.amplitude, rel=1e-12)
 
 
 def test_a_bilinear_oscillator_has_one_frequency():
