@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from fem.render import StopSphere
 from nldyn.scene.build import place
+from nldyn.scene.followed import followed_parameter
 from nldyn.scene.schema import Scene
 from nldyn.system.naming import is_angle
+from nldyn.system.parameters import Parameter
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -27,6 +29,8 @@ def side(scene: Scene, name: str) -> tuple[Scene, str, str]:
 
 def why_not_drawn(scene: Scene, index: int) -> str:
     """Why a stop cannot be drawn; empty where it can."""
+    if followed_parameter(scene) == Parameter("gap", index):
+        return "has a gap that changes from orbit to orbit"
     stop = scene.stops[index]
     sides = [side(scene, name) for name in (stop.at, stop.against) if name is not None]
     directions = [direction for _, _, direction in sides]

@@ -2,14 +2,16 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
 
 from nldyn.base.errors import SceneError
 from nldyn.base.resources import example
-from nldyn.report.page import page_content
-from nldyn.report.results import summary, tables_of, write_results
+from nldyn.report.offline import unpacked
+from nldyn.report.results import write_results
+from nldyn.report.stop_spheres import not_drawn, stops_to_draw
 from nldyn.scene import build_system, load_scene
 from nldyn.scene.followed import axis_of, followed_parameter
 from nldyn.scene.load_case import load_case_of
@@ -147,7 +149,7 @@ def test_tables_and_answers_are_named_after_the_parameter(scene, found, tmp_path
     with (folder / "special_points.csv").open() as file:
         folds = [float(row["gap"]) for row in csv.DictReader(file) if row["type"] == "LP"]
     told = json.loads((folder / "summary.json").read_text())
-    assert told["parameter"], told["frequency_hz"] == ("gap", 23.0)
+    assert (told["parameter"], told["frequency_hz"]) == ("gap", 23.0)
     assert told["branches"][0]["range"] == [0.0, 5e-5]
     peak, force, stable, _, jumps = told["answer"]
     assert " µm at gap 29." in peak and " N at gap 29." in force
@@ -156,8 +158,9 @@ def test_tables_and_answers_are_named_after_the_parameter(scene, found, tmp_path
     assert jumps == f"jumps: as the gap rises past {high}; as the gap falls past {low}"
 
 
-def test_the_page_is_drawn_over_the_parameter(scene, found):
-    content = page_content(found, tables_of(found), summary(found), scene)
+def test_the_page_is_drawn_over_the_parameter(scene, found, tmp_path):
+    folder = write_results(found, tmp_path / "out", scene)
+    content = unpacked((folder / "report.html").read_text(encoding="utf-8"))
     assert content["along"] == "gap (µm)"
     assert content["span"] == "gap 0 to 50 µm, at 23 Hz"
     assert content["range"] == pytest.approx([0.0, 50.0])
@@ -168,6 +171,16 @@ def test_the_page_is_drawn_over_the_parameter(scene, found):
         assert orbit["walls"] == pytest.approx([1e-6 * orbit["x"]], abs=1e-15)
         assert orbit["title"].endswith(" µm") and " at 23 Hz, gap " in orbit["title"]
     assert content["tables"]["special points"]["columns"][2] == "gap (µm)"
+
+
+def test_a_stop_whose_gap_changes_is_not_drawn_at_one_gap():
+    text = load_scene(example("two_dof_xi_0.01.toml")).text
+    own = 'parameter = "gap"\nrange = [0.0, 5e-5]\nfrequency_hz = 23.0'
+    changed = re.sub("(?m)^range_hz = .*$", own, text)
+    assert not_drawn(parse_scene(text)) == []
+    (said,) = not_drawn(parse_scene(changed))
+    assert said.endswith("which has a gap that changes from orbit to orbit")
+    assert stops_to_draw(parse_scene(changed)) == []
 
 
 def test_modes_are_not_chosen_over_a_parameter():
