@@ -66,8 +66,8 @@ static void fill_rounding(const Motion *M)
     double *rounding = M->s->rounding;
     for (int a = 0; a < panel->na; a++) {
         int stop = panel->active[a];
-        rounding[a] = is_rigid(fl, stop) ? pressing_noise(fl, stop, M->w)
-                                         : output_noise(fl, stop, M->w);
+        rounding[a] = is_held(fl, stop) ? pressing_noise(fl, stop, M->w)
+                                        : output_noise(fl, stop, M->w);
     }
     for (int o = panel->na; o < panel->outputs; o++)
         rounding[o] = rate_noise(fl, panel->active[o - panel->na], M->w);
@@ -82,7 +82,7 @@ static void carry_noise(Motion *M, double h)
         int stop = panel->active[a];
         double more = carried_noise(M->fl, stop, M->w, panel->depth[a], h);
         panel->end_doubt[a] = panel->doubt[a] + more;
-        if (!is_rigid(M->fl, stop))
+        if (!is_held(M->fl, stop))
             M->s->noise[a] = smaller(panel->end_doubt[a], M->s->rounding[a]);
     }
 }
@@ -106,7 +106,7 @@ static void aim_at_release(const Motion *M, Trial *trial)
     if (trial->aim >= 0 || trial->kind % 2 != 1 || !(trial->h < trial->h_max)) return;
     for (int a = 0; a < M->panel->na; a++) {
         int s = M->panel->active[a];
-        bool elastic = trial->aim < 0 && !(is_rigid(fl, s) || is_bond(fl, s));
+        bool elastic = trial->aim < 0 && is_elastic(fl, s);
         if (elastic && time_to_event(fl, s, M->closed, M->w_end, end_phase) < trial->h)
             trial->aim = s;
     }
@@ -124,7 +124,11 @@ static int reach_aim(Motion *M, Trial *trial, bool event, bool fine)
     double off = watched_pace(fl, aim, M->closed, w, end_phase).value;
     int out = watched(fl, aim, M->closed, w, end_phase);
     bool there = fabs(off) <= output_noise(fl, out, M->w);
-    if (resting(fl, aim, M->closed)) {
+    if (is_slider(fl, aim)) {
+        dh = time_to_slip(M, aim, trial->kind, end_phase, h, &off);
+        there = fabs(dh) <= RELEASED * h ||
+                (fl->slides[aim] != 0 && fabs(off) <= rate_noise(fl, aim, M->w));
+    } else if (ends_smoothly(fl, aim, M->closed)) {
         dh = time_to_release(M->tab, aim, trial->kind, h, M->panel);
         there = fabs(dh) <= RELEASED * h;
     }
@@ -137,6 +141,9 @@ static int reach_aim(Motion *M, Trial *trial, bool event, bool fine)
     } else if (!event && dh == INFINITY && !M->closed[aim] && h < MISSED * trial->tried) {
         change_length(M, trial, trial->kind, FARTHER); /* it is farther off than it was seen */
         return AGAIN;
+    } else if (!event && dh > h && is_slider(fl, aim) && h < trial->h_max) {
+        change_length(M, trial, trial->kind, smaller(FARTHER, trial->h_max / h));
+        return AGAIN; /* it came sooner in the motion before */
     } else if (dh > 0.0 && fine) { /* the contact goes on */
         return TAKEN;
     }
@@ -158,7 +165,7 @@ static int judge(Motion *M, Trial *trial, Event event, bool fine, bool lost)
         near_end = larger(smaller(INSTANTS * stop_of(fl, event.stop)->instant, FARTHEST_END), AT_ONCE);
     bool ends = event.where > 1.0 - near_end;
     if (event.stop >= 0 && (trial->aim < 0 || !ends) && !lost) {
-        int goal = resting(fl, event.stop, M->closed) ? trial->smooth : trial->to_switch;
+        int goal = ends_smoothly(fl, event.stop, M->closed) ? trial->smooth : trial->to_switch;
         trial->aim = event.stop;
         if (trial->h * event.where > M->h_mapped) { /* half the way first */
             goal = trial->smooth;

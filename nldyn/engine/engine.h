@@ -79,14 +79,21 @@ typedef struct {
     double bond;        /* 1 for what is no stop but acts all the time, with the law `bond_law` */
     double drag, cubic; /* of a bond: coefficients of u² u' and u'^3 */
     double release;     /* output δ + δ' dashpot/stiffness of a stop that never pulls, or -1 */
+    double friction;    /* of a slider: coefficient while it slides; -1 for what is none */
+    double adhesion;    /* by how much more it is at rest */
+    double fading;      /* speed in which that falls to 1/e; 0 for at once: there is none */
+    double belt;        /* speed of what it slides on */
+    double normal;      /* stop whose force presses it on, or -1 */
+    double pressing;    /* force that does so in place of a stop's */
 } Stop;
 
 enum Column {
     GAP, STIFFNESS, EXPONENT, DISSIPATION, DASHPOT, MOBILITY, DURATION, INSTANT, RESTITUTION, BOND,
-    DRAG, CUBIC, RELEASE, FIRST_POWER
+    DRAG, CUBIC, RELEASE, FRICTION, ADHESION, FADING, BELT, NORMAL, PRESSING, FIRST_POWER
 };
 
-/* A system. Outputs are the penetrations of the stops, then the observed displacements. */
+/* A system. Outputs are the penetrations of the stops and the displacements of sliders and bonds,
+ * then the observed displacements. */
 typedef struct {
     int64_t n, n_out, n_stops, n_columns, n_orders;
     const double *blocks; /* (n, 2, 2) */
@@ -95,7 +102,7 @@ typedef struct {
     const double *force;  /* (2n, n_stops): w' = A w - force F */
     const double *orders; /* (h,) multiples of the excitation frequency; 1 first */
     const Complex *drive; /* (h, 3, 2n) excitation Σ Re(Σ_p ω^p drive[h, p] e^{i orders[h] ωt}) */
-    const double *stops;  /* (n_stops, n_columns), bonds last */
+    const double *stops;  /* (n_stops, n_columns): stops, sliders, bonds */
     const int64_t *laws;  /* (n_stops,) address of a law (of a rigid stop's restitution), or 0 */
     double tail;          /* largest relative Legendre tail accepted on a contact panel */
     double node_angle;    /* phase of the fastest mode from node to node, in rad */
@@ -142,6 +149,7 @@ typedef struct {
     const double *blocks, *rows, *bound3, *stops;
     double *pushes; /* (n_stops, 2n): w' = A w - Σ pushes F */
     const int64_t *laws;
+    int *slides; /* (n_stops,) which way each slider slides: 1, -1, or 0 where it sticks */
     Term *terms; /* beside the steady one at order 1 */
     /* (1 + k, 2 + n_parameters, 2n): amplitude of the steady response at order 1, z = w +
      * Re(response[0, 0] e^{iωt}), and of each further term; then their derivatives with respect to
@@ -155,9 +163,9 @@ typedef struct {
 
 /* Arrays of a contact panel with na stops, m nodes and n modes, filled by `solve_panel`; what
  * depends on kind and length alone serves the next panel of the same stops too. Outputs are the
- * na penetrations and, if a force depends on them, their na rates. That of a rigid stop is the
- * acceleration with which the gap would close without its own force; the force is in proportion
- * to it. */
+ * na penetrations and, if a force depends on them, their na rates. That of a rigid stop, and of a
+ * slider that sticks, is the acceleration that it would have without its own force; the force is in
+ * proportion to it. */
 typedef struct {
     int na, m, outputs;
     int *active;      /* (na,) closed stops */

@@ -1,4 +1,4 @@
-/* When stops open and close. */
+/* When stops open and close, and sliders slide and stick. */
 #include "engine.h"
 
 #define PRESSING_ROUNDING 1e-14 /* of its terms: the acceleration against which a rigid stop presses */
@@ -76,6 +76,43 @@ static double coarsest_instant(const Flow *fl)
     return found;
 }
 
+/* speed of a slider along what it slides on, in the sense in which it slides */
+static double slip(const Flow *fl, int s, const double *w, double phase)
+{
+    return fl->slides[s] * (output_now(fl, s, w, phase).first - stop_of(fl, s)->belt);
+}
+
+/* fill values (m,) at the nodes of a panel, positive as long as a slider at a place among the
+ * closed ones slides on, or sticks without more force than its friction to one `side` */
+static void show_slider(const Flow *fl, const Panel *panel, int position, int side, double *values)
+{
+    int m = panel->m, s = panel->active[position];
+    for (int i = 0; i < m; i++)
+        if (fl->slides[s] != 0)
+            values[i] = fl->slides[s] * (panel->output[(panel->na + position) * m + i] -
+                                         stop_of(fl, s)->belt);
+        else
+            values[i] = grip(fl, s) * normal_at(fl, panel, s, i) -
+                        side * panel->F[position * m + i];
+}
+
+/* time from the end of a panel to where a slider sticks or slips, or inf, and the value that it
+ * passes zero with */
+static double time_to_slip(const Motion *M, int s, int kind, double end_phase, double h,
+                           double *value)
+{
+    const Flow *fl = M->fl;
+    const Panel *panel = M->panel;
+    double *nodes = M->s->inner;
+    int position = 0;
+    while (panel->active[position] != s) position++;
+    int side = at_end(M->tab, panel->F + (size_t)position * panel->m) < 0.0 ? -1 : 1;
+    show_slider(fl, panel, position, side, nodes);
+    *value = fl->slides[s] != 0 ? slip(fl, s, M->w_end, end_phase) : at_end(M->tab, nodes);
+    double slope = slope_at_end(M->tab, nodes) / (h * (kind == 0 ? 1.0 : M->tab->power));
+    return slope < 0.0 ? -*value / slope : INFINITY;
+}
+
 /* whether a stop is just about to switch, to within a time allowed or rounding: of the state, and of
  * the time, since an instant is known no better than its phase */
 static bool at_switch(const Flow *fl, int stop, const double *w, double phase, double allowed,
@@ -83,6 +120,9 @@ static bool at_switch(const Flow *fl, int stop, const double *w, double phase, d
 {
     Course at = watched_pace(fl, stop, closed, w, phase);
     int out = watched(fl, stop, closed, w, phase);
+    if (is_slider(fl, stop)) /* where it sticks, the state does not tell */
+        return fabs(slip(fl, stop, w, phase)) <=
+               allowed * fabs(at.second) + 10.0 * rate_noise(fl, stop, w);
     double instant = allowed + 10.0 * SUM_ROUNDING * phase / fl->omega;
     return fabs(at.value) <= instant * fabs(at.first) + 10.0 * output_noise(fl, out, w);
 }
@@ -92,15 +132,15 @@ static bool at_switch(const Flow *fl, int stop, const double *w, double phase, d
 static bool with_event(const Flow *fl, int stop, const double *w, double phase, double allowed,
                        const bool *closed)
 {
-    if (is_bond(fl, stop) || is_rigid(fl, stop)) return false;
+    if (!is_elastic(fl, stop)) return false;
     if (!at_switch(fl, stop, w, phase, allowed, closed)) return false;
     return closed[stop] != (watched_pace(fl, stop, closed, w, phase).first > 0.0);
 }
 
-/* whether a body rests on a stop that is rigid */
-static bool resting(const Flow *fl, int stop, const bool *closed)
+/* whether a stop's next event is no switch of a force: a body rests on a rigid one, or slides */
+static bool ends_smoothly(const Flow *fl, int stop, const bool *closed)
 {
-    return closed[stop] && is_rigid(fl, stop);
+    return closed[stop] && (is_rigid(fl, stop) || is_slider(fl, stop));
 }
 
 /* error allowed in the instant at which a stop and others with it open or close */
@@ -125,7 +165,7 @@ static int stop_at_switch(const Flow *fl, const double *w, double phase, double 
     double nearest = INFINITY;
     double allowed = 10.0 * (coarsest_instant(fl) * h + SUM_ROUNDING * phase / fl->omega);
     for (int s = 0; s < fl->n_stops; s++) {
-        if (is_bond(fl, s) || (is_rigid(fl, s) && closed[s])) continue;
+        if (is_bond(fl, s) || is_slider(fl, s) || (is_rigid(fl, s) && closed[s])) continue;
         double late = fabs(time_to_event(fl, s, closed, w, phase));
         double gap = watched_pace(fl, s, closed, w, phase).value;
         int out = watched(fl, s, closed, w, phase);
@@ -226,6 +266,29 @@ static Shown show_stop(const Motion *M, int kind, double phase, double h, int st
     return shown;
 }
 
+/* the same of a slider, to one side of its friction */
+static Shown show_friction(const Motion *M, double phase, double h, int s, int position, int side)
+{
+    const Flow *fl = M->fl;
+    const Gauss *tab = M->tab;
+    Scratch *scratch = M->s;
+    double *values = scratch->values, *inner = scratch->inner;
+    int m = M->panel->m;
+    show_slider(fl, M->panel, position, side, inner);
+    for (int i = 0; i < m; i++) values[i + 1] = inner[i];
+    values[0] = at_start(tab, inner);
+    values[m + 1] = at_end(tab, inner);
+    Shown shown = {pressing_noise(fl, s, M->w) / stop_of(fl, s)->mobility, 0.0, 0.0};
+    if (fl->slides[s] != 0) {
+        values[0] = slip(fl, s, M->w, phase);
+        values[m + 1] = slip(fl, s, M->w_end, phase + fl->omega * h);
+        shown = (Shown){rate_noise(fl, s, M->w), 0.0, values[1] - values[0]};
+    }
+    refine(tab, values, scratch->fine);
+    shown.tail = 4.0 * legendre_tail(tab, inner);
+    return shown;
+}
+
 /* whether a stop that lets go without pulling is beyond its surface at stretched time `root`, where
  * its force would press in vain */
 static bool presses_in_vain(const Motion *M, int kind, double phase, double h, int stop,
@@ -241,39 +304,52 @@ static bool presses_in_vain(const Motion *M, int kind, double phase, double h, i
     return interpolate(M->tab, s->values, root) < stop_of(fl, stop)->gap;
 }
 
+/* take the first event that s->values show into account */
+static void find_event(const Motion *M, int kind, double phase, double h, int stop, Shown shown,
+                       Event *found)
+{
+    Scratch *s = M->s;
+    bool hidden = !M->closed[stop] && watched(M->fl, stop, M->closed, M->w, phase) != stop;
+    double below = shown.noise + shown.tail, edge = 0.0;
+    if (shown.speed > 0.0) { /* the panel may begin a little before the event it begins with */
+        below += 2.0 * larger(-s->values[0], 0.0);
+        edge = smaller(2.0 * s->values[0], 0.0);
+    }
+    double root = first_root(M->tab, s->values, s->fine, below, edge);
+    if (root <= 1.0) {
+        double fraction = map_fraction(M->tab, kind, root);
+        if (hidden && presses_in_vain(M, kind, phase, h, stop, root)) {
+            found->doubtful = smaller(found->doubtful, fraction);
+        } else if (fraction < found->where) {
+            found->stop = stop;
+            found->where = fraction;
+        }
+    } else if (shown.tail > 10.0 * shown.noise) {
+        double low = first_doubt(M->tab, s->values, s->fine, shown.noise, shown.tail);
+        if (low < 1.0) found->doubtful = smaller(found->doubtful, map_fraction(M->tab, kind, low));
+    }
+}
+
 /* the first event within a panel */
 static Event first_event(const Motion *M, int kind, double phase, double h)
 {
     const Flow *fl = M->fl;
-    Scratch *s = M->s;
     Event found = {-1, 2.0, 2.0};
     int position = -1;
     if (M->panel->na < fl->n_stops) drive_back(fl, M->tab, kind, M->w, h, M->panel, s);
     for (int stop = 0; stop < fl->n_stops; stop++) {
         if (M->closed[stop]) position++; /* a bond is always closed */
-        if (is_bond(fl, stop)) continue;
-        int out = watched(fl, stop, M->closed, M->w, phase);
-        Shown shown = show_stop(M, kind, phase, h, stop, out, position);
-        double below = shown.noise + shown.tail, edge = 0.0;
-        if (shown.speed > 0.0) { /* the panel may begin a little before the event it begins with */
-            below += 2.0 * larger(-s->values[0], 0.0);
-            edge = smaller(2.0 * s->values[0], 0.0);
+        if (is_bond(fl, stop) || (is_slider(fl, stop) && !M->closed[stop])) continue;
+        if (!is_slider(fl, stop)) {
+            int out = watched(fl, stop, M->closed, M->w, phase);
+            Shown shown = show_stop(M, kind, phase, h, stop, out, position);
+            find_event(M, kind, phase, h, stop, shown, &found);
+            continue;
         }
-        double root = first_root(M->tab, s->values, s->fine, below, edge);
-        if (root <= 1.0) {
-            double fraction = map_fraction(M->tab, kind, root);
-            if (!M->closed[stop] && out != stop &&
-                presses_in_vain(M, kind, phase, h, stop, root)) {
-                found.doubtful = smaller(found.doubtful, fraction);
-            } else if (fraction < found.where) {
-                found.stop = stop;
-                found.where = fraction;
-            }
-        } else if (shown.tail > 10.0 * shown.noise) {
-            double low = first_doubt(M->tab, s->values, s->fine, shown.noise, shown.tail);
-            if (low < 1.0)
-                found.doubtful = smaller(found.doubtful, map_fraction(M->tab, kind, low));
-        }
+        for (int side = -1; side <= 1; side += 2) /* what slides has one only */
+            if (fl->slides[stop] == 0 || side == 1)
+                find_event(M, kind, phase, h, stop, show_friction(M, phase, h, stop, position, side),
+                           &found);
     }
     if (!(found.doubtful < found.where)) found.doubtful = 2.0;
     return found;

@@ -85,8 +85,8 @@ static void keep_profile(const Flow *fl, const Gauss *tab, int kind, int new_kin
         double *output = panel->output + (size_t)a * m, top = 0.0;
         stretch_profile(tab, kind, new_kind, ratio, output, guess);
         for (int i = 0; i < m; i++) top = larger(top, guess[i]);
-        bool bond = is_bond(fl, panel->active[a]);
-        for (int i = 0; i < m; i++) output[i] = bond ? guess[i] : larger(guess[i], SMALLEST * top);
+        bool pressed = is_elastic(fl, panel->active[a]) || is_rigid(fl, panel->active[a]);
+        for (int i = 0; i < m; i++) output[i] = !pressed ? guess[i] : larger(guess[i], SMALLEST * top);
     }
 }
 
@@ -165,11 +165,11 @@ static void guess_outputs(const Flow *fl, const Gauss *tab, double phase, const 
 {
     int m = panel->m, stop = panel->active[a];
     double *delta = panel->output + (size_t)a * m;
-    if (is_bond(fl, stop)) {
+    if (is_bond(fl, stop) || (is_slider(fl, stop) && !is_held(fl, stop))) {
         hold_still(fl, phase, w, a, panel);
         return;
     }
-    if (is_rigid(fl, stop)) {
+    if (is_held(fl, stop)) {
         double push = output_now(fl, stop, w, phase).second;
         for (int i = 0; i < m; i++) delta[i] = push;
         return;
@@ -198,7 +198,7 @@ static Choice guess_panel(const Flow *fl, const Gauss *tab, double phase, const 
     double length = h;
     for (int a = 0; a < panel->na; a++) {
         int stop = panel->active[a];
-        if (is_bond(fl, stop) || is_rigid(fl, stop)) continue;
+        if (!is_elastic(fl, stop)) continue;
         Impact hit = expected_contact(fl, stop, w, phase);
         Value out = creep(fl, stop, w, phase, hit.duration);
         double most = hit.left;

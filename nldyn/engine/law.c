@@ -30,6 +30,42 @@ static bool is_bond(const Flow *fl, int s) { return stop_of(fl, s)->bond != 0.0;
 
 static bool is_rigid(const Flow *fl, int s) { return stop_of(fl, s)->restitution >= 0.0; }
 
+static bool is_slider(const Flow *fl, int s) { return stop_of(fl, s)->friction >= 0.0; }
+
+/* whether a force keeps an acceleration at zero: that of a rigid gap, or of a slider that sticks */
+static bool is_held(const Flow *fl, int s)
+{
+    return is_rigid(fl, s) || (is_slider(fl, s) && fl->slides[s] == 0);
+}
+
+static bool is_elastic(const Flow *fl, int s)
+{
+    return !(is_rigid(fl, s) || is_slider(fl, s) || is_bond(fl, s));
+}
+
+/* whether a stop presses a slider on, in place of a constant force */
+static bool is_pressed(const Flow *fl, int s)
+{
+    return is_slider(fl, s) && stop_of(fl, s)->normal >= 0.0;
+}
+
+/* friction per unit of the normal force, (μ + adhesion e^{-|v|/fading}) in the sense of sliding, and
+ * its derivative by the speed; with fl->slides = 0 nothing */
+static Value friction_at(const Flow *fl, int s, double speed)
+{
+    const Stop *slider = stop_of(fl, s);
+    int way = fl->slides[s];
+    if (slider->adhesion == 0.0) return (Value){way * slider->friction, 0.0};
+    double more = slider->adhesion * exp(-way * (speed - slider->belt) / slider->fading);
+    return (Value){way * (slider->friction + more), -more / slider->fading};
+}
+
+/* most friction per unit of the normal force at rest */
+static double grip(const Flow *fl, int s)
+{
+    return stop_of(fl, s)->friction + stop_of(fl, s)->adhesion;
+}
+
 /* whether a stop with a dashpot lets go where its force would pull */
 static bool never_pulls(const Flow *fl, int s) { return stop_of(fl, s)->release >= 0.0; }
 
@@ -64,12 +100,20 @@ static Force pressing_law(const Flow *fl, int s, double delta, double speed)
     return power_law(stop_of(fl, s), delta, speed);
 }
 
+/* force of a slider, pressed on by a normal force, and its derivatives, those by that force apart */
+static Force sliding_law(const Flow *fl, int s, double speed, double normal)
+{
+    Value by = friction_at(fl, s, speed);
+    return (Force){by.value * normal, 0.0, by.slope * normal};
+}
+
 /* contact force of an elastic stop and its derivatives by penetration and speed */
 static Force law(const Flow *fl, int s, double delta, double speed)
 {
     const Stop *stop = stop_of(fl, s);
     Force none = {0.0, 0.0, 0.0};
     if (is_bond(fl, s)) return bond_law(fl, s, delta, speed);
+    if (is_slider(fl, s)) return sliding_law(fl, s, speed, stop->pressing);
     if (delta <= 0.0 || is_rigid(fl, s)) return none;
     if (never_pulls(fl, s) && stop->stiffness * delta < -stop->dashpot * speed) return none;
     return pressing_law(fl, s, delta, speed);
@@ -77,13 +121,13 @@ static Force law(const Flow *fl, int s, double delta, double speed)
 
 /* The same within a panel on which the stop is closed. There a law whose slope sets in almost at
  * once goes on beyond the switch, as an odd function: the outermost node may come to lie on its
- * other side, and would drop the whole stiffness. So does a dashpot. A rigid stop makes the
+ * other side, and would drop the whole stiffness. So does a dashpot. What is held makes the
  * acceleration vanish, which stands in for the penetration. */
 static Force closed_law(const Flow *fl, int s, double delta, double speed)
 {
     const Stop *stop = stop_of(fl, s);
-    if (is_rigid(fl, s)) return (Force){delta / stop->mobility, 1.0 / stop->mobility, 0.0};
-    if (is_bond(fl, s)) return law(fl, s, delta, speed);
+    if (is_held(fl, s)) return (Force){delta / stop->mobility, 1.0 / stop->mobility, 0.0};
+    if (is_bond(fl, s) || is_slider(fl, s)) return law(fl, s, delta, speed);
     if (delta > 0.0) return pressing_law(fl, s, delta, speed);
     double dashpot = stop->dashpot;
     if (stop->exponent < ROUND) {
@@ -136,7 +180,7 @@ static bool depends_on_speed(const Flow *fl, int s)
 /* whether it does, or is to be differentiated by what makes it do so */
 static bool needs_speed(const Flow *fl, int s)
 {
-    bool needed = depends_on_speed(fl, s);
+    bool needed = depends_on_speed(fl, s) || is_slider(fl, s); /* whose rate tells when it sticks */
     for (int c = 0; c < fl->n_parameters; c++) {
         int64_t column = fl->parameters[2 * c];
         bool viscous = column == DISSIPATION || column == DASHPOT;

@@ -32,6 +32,12 @@ class StopRow(NamedTuple):
     drag: float = 0.0  # of a bond: coefficients of u² u' and u'^3
     cubic: float = 0.0
     release: float = -1.0  # output δ + δ' dashpot/stiffness of a stop that never pulls, or -1
+    friction: float = -1.0  # of a slider: coefficient while it slides; -1 for what is none
+    adhesion: float = 0.0  # by how much more it is at rest
+    fading: float = 0.0  # speed in which that falls to 1/e; 0 where there is none
+    belt: float = 0.0  # speed of what it slides on
+    normal: float = -1.0  # stop whose force presses it on, or -1
+    pressing: float = 0.0  # force that does so in place of a stop's
 
 
 FIRST_POWER = len(
@@ -42,7 +48,8 @@ FIRST_POWER = len(
 class SystemData(NamedTuple):
     """Numbers of a system, as the engine needs them.
 
-    Outputs are the penetrations of the stops, then the observed displacements.
+    Outputs are the penetrations of the stops and the displacements of sliders and bonds, then the
+    observed displacements.
     """
 
     blocks: Real  # (n, 2, 2)
@@ -51,7 +58,7 @@ class SystemData(NamedTuple):
     force: Real  # (2n, n_stops): w' = A w - force @ F
     orders: Real  # (h,) multiples of the excitation frequency at which something acts; 1 first
     drive: Complex  # (h, 3, 2n) excitation Σ Re(Σ_p ω^p drive[h, p] e^{i orders[h] ωt}) of z
-    stops: Real  # (n_stops, ...), rows as `StopRow`, bonds last; then coefficients of bonds
+    stops: Real  # (n_stops, ...), of stops, sliders and bonds: `StopRow`, coefficients of bonds
     # (n_stops,) address of a law (of a rigid stop: of its restitution), or 0
     laws: NDArray[np.int64]
     tail: float  # largest relative Legendre tail accepted on a contact panel

@@ -39,10 +39,10 @@ static bool same_stops(const Panel *panel, const int *active, int na)
     return true;
 }
 
-/* which row of a stop an output of a panel is: a rigid stop's is its acceleration */
+/* which row of a stop an output of a panel is: of what is held the acceleration */
 static int output_order(const Flow *fl, int stop, int rate)
 {
-    return rate == 0 && is_rigid(fl, stop) ? 2 : rate;
+    return rate == 0 && is_held(fl, stop) ? 2 : rate;
 }
 
 /* speed that a unit impulse at another stop takes from the closing of a stop's gap, in 1/kg */
@@ -95,7 +95,7 @@ static void fill_influences(const Flow *fl, const Gauss *tab, int kind, double h
             for (int j = 0; j < m; j++)
                 for (int i = 0; i < m; i++)
                     G[(size_t)j * height + i] = -h * integrate[j * m + i] * product[j * m + i];
-            if (o < na && a != o && is_rigid(fl, panel->active[o])) { /* what acts at once */
+            if (o < na && a != o && is_held(fl, panel->active[o])) { /* what acts at once */
                 double kick = between(fl, panel->active[o], panel->active[a]);
                 for (int i = 0; i < m; i++) G[(size_t)i * height + i] -= kick;
             }
@@ -188,6 +188,42 @@ static void free_outputs(const Flow *fl, const Gauss *tab, int kind, double phas
                              s->step, s->free + (size_t)o * m);
 }
 
+/* place among the closed stops of the one that presses a closed slider on, or -1 */
+static int pressing_place(const Flow *fl, const Panel *panel, int a)
+{
+    if (!is_pressed(fl, panel->active[a]) || is_held(fl, panel->active[a])) return -1;
+    int normal = (int)stop_of(fl, panel->active[a])->normal, place = 0;
+    while (panel->active[place] != normal) place++;
+    return place;
+}
+
+/* force that presses a slider on, at node i of a panel */
+static double normal_at(const Flow *fl, const Panel *panel, int s, int i)
+{
+    int normal = (int)stop_of(fl, s)->normal, place = 0;
+    if (normal < 0) return stop_of(fl, s)->pressing;
+    while (panel->active[place] != normal) place++;
+    return panel->F[place * panel->m + i];
+}
+
+/* add to rows of sliders what they have of the rows of the stops that press them on, in a matrix
+ * (na m, n_columns) of how forces change by the outputs; entries of a row, and rows, lie so far
+ * apart */
+static void add_friction(const Flow *fl, const Panel *panel, double *matrix, int n_columns,
+                         size_t entry, size_t row)
+{
+    int na = panel->na, m = panel->m;
+    for (int a = 0; a < na; a++) {
+        int normal = pressing_place(fl, panel, a);
+        for (int i = 0; i < m && normal >= 0; i++) {
+            double share = friction_at(fl, panel->active[a], panel->output[(na + a) * m + i]).value;
+            const double *from = matrix + (size_t)(normal * m + i) * row;
+            double *to = matrix + (size_t)(a * m + i) * row;
+            for (int c = 0; c < n_columns; c++) to[c * entry] += share * from[c * entry];
+        }
+    }
+}
+
 /* fill F from the outputs at the nodes, and its derivatives into `slope` */
 static void panel_forces(const Flow *fl, Panel *panel, double *slope)
 {
@@ -200,10 +236,19 @@ static void panel_forces(const Flow *fl, Panel *panel, double *slope)
         closed_laws(fl, panel->active[a], m, delta, speed, panel->F + (size_t)a * m,
                     slope + (size_t)a * m, viscosity);
     }
+    for (int a = 0; a < na; a++) { /* sliders that stops press on come after these */
+        int normal = pressing_place(fl, panel, a);
+        for (int i = 0; i < m && normal >= 0; i++) {
+            Force f = sliding_law(fl, panel->active[a], panel->output[(na + a) * m + i],
+                                  panel->F[normal * m + i]);
+            panel->F[a * m + i] = f.force;
+            slope[(na + a) * m + i] = f.viscosity;
+        }
+    }
 }
 
 /* fill the inverse of the matrix 1 - slope G */
-static void invert_panel(Panel *panel)
+static void invert_panel(const Flow *fl, Panel *panel)
 {
     int width = panel->na * panel->m, height = panel->outputs * panel->m, pad = padded(width);
     const double *slope = panel->slope, *rates = slope + width;
@@ -213,9 +258,10 @@ static void invert_panel(Panel *panel)
         for (int p = 0; p < width; p++) column[p] = -slope[p] * G[p];
         if (height > width)
             for (int p = 0; p < width; p++) column[p] -= rates[p] * G[width + p];
-        column[q] += 1.0;
         for (int p = width; p < pad; p++) column[p] = 0.0;
     }
+    add_friction(fl, panel, panel->inverse, width, pad, 1);
+    for (int q = 0; q < width; q++) panel->inverse[(size_t)q * pad + q] += 1.0;
     invert(panel->inverse, width, panel->order);
 }
 
@@ -252,13 +298,18 @@ static double rounded_force(const Panel *panel, const double *force, int a, int 
 }
 
 /* whether the forces (na m,) are those of the penetrations that they lead to */
-static bool consistent(const Panel *panel, const double *force, const double *noise)
+static bool consistent(const Flow *fl, const Panel *panel, const double *force,
+                       const double *noise)
 {
     int na = panel->na, m = panel->m;
     for (int a = 0; a < na; a++) {
         double allowed = SETTLED * largest(panel->F + (size_t)a * m, m);
         for (int o = a; o < panel->outputs; o += na)
             allowed += 10.0 * noise[o] * largest(panel->slope + (size_t)o * m, m);
+        int normal = pressing_place(fl, panel, a);
+        for (int o = normal; o >= 0 && o < panel->outputs; o += na)
+            allowed += 10.0 * grip(fl, panel->active[a]) * noise[o] *
+                       largest(panel->slope + (size_t)o * m, m);
         for (int i = 0; i < m; i++) {
             double off = fabs(panel->F[a * m + i] - force[a * m + i]);
             if (off > allowed && off > allowed + rounded_force(panel, force, a, i)) return false;
@@ -268,7 +319,7 @@ static bool consistent(const Panel *panel, const double *force, const double *no
 }
 
 /* take a Newton step of the forces (na m,) */
-static void step_forces(Panel *panel, Scratch *s, int iteration)
+static void step_forces(const Flow *fl, Panel *panel, Scratch *s, int iteration)
 {
     int width = panel->na * panel->m;
     for (int p = 0; p < width; p++) {
@@ -286,6 +337,7 @@ static void step_forces(Panel *panel, Scratch *s, int iteration)
                 int place = o * panel->m + p;
                 s->step[p] += panel->slope[place] * (s->led[place] - panel->output[place]);
             }
+        add_friction(fl, panel, s->step, 1, 1, 1);
     }
     combine(s->led, s->solved, width, panel->inverse, padded(width), s->step, 1, width);
     memcpy(s->solved, s->led, sizeof(double) * width);
@@ -332,10 +384,10 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
         bool fresh = !panel->kept;
         if (fresh) {
             for (int p = 0; p < count; p++) panel->slope[p] = s->new_slope[p];
-            invert_panel(panel);
+            invert_panel(fl, panel);
             panel->kept = true;
         }
-        step_forces(panel, s, iteration);
+        step_forces(fl, panel, s, iteration);
         double change = renew_outputs(panel, s, noise);
         if (isnan(change)) break;
         /* the error left: goes with the square after a step with a fresh matrix, else linearly;
@@ -344,7 +396,7 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
         double left = fresh ? change * change : change * rate / larger(1.0 - rate, SLOWEST);
         if (left <= SOLVED && (fresh || before < INFINITY || change == 0.0)) {
             panel_forces(fl, panel, panel->slope);
-            if (consistent(panel, s->solved, noise)) return true;
+            if (consistent(fl, panel, s->solved, noise)) return true;
             rate = 1.0; /* that estimate trusts in the order of convergence */
         }
         if (rate > STALE) panel->kept = false;

@@ -101,6 +101,13 @@ static void add_node_columns(const Flow *fl, double node_phase, double t, const 
     for (int c = 0; c < fl->n_parameters && order == 0; c++) {
         int64_t column = fl->parameters[2 * c];
         if (fl->parameters[2 * c + 1] != stop || column < GAP) continue;
+        if (is_slider(fl, stop)) { /* what is held does not go with its friction */
+            double way = friction_at(fl, stop, panel->output[(na + o) * m + i]).value;
+            if (column == PRESSING) forces[fl->size + c] += way;
+            if (column == FRICTION)
+                forces[fl->size + c] += fl->slides[stop] * normal_at(fl, panel, stop, i);
+            continue;
+        }
         double speed = panel->outputs > na ? panel->output[(na + o) * m + i] : 0.0;
         forces[fl->size + c] += law_by(fl, stop, column, panel->output[o * m + i], speed);
     }
@@ -126,7 +133,8 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
             add_node_columns(fl, phase + fl->omega * t, t0 + t, panel, o, i, n_columns, forces);
         }
     }
-    invert_panel(panel);
+    add_friction(fl, panel, s->forces, n_columns, 1, n_columns);
+    invert_panel(fl, panel);
     for (int a = 0; a < na; a++) {
         for (int j = 0; j < m; j++) {
             double *part = s->part + (size_t)j * n_columns, weight = h * tab->weights[kind * m + j];

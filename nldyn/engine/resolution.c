@@ -113,7 +113,7 @@ static bool sways_unseen(const Flow *fl, const Gauss *tab, int kind, double h, c
 {
     double stiffness = 0.0;
     for (int a = 0; a < panel->na; a++)
-        if (!is_rigid(fl, panel->active[a]))
+        if (!is_held(fl, panel->active[a]))
             stiffness += stop_of(fl, panel->active[a])->mobility *
                          largest(piece_row(panel->slope, a, panel->m), panel->m);
     double longest = fl->node_angle * panel->m * (kind == 0 ? 1.0 : MAPPED / tab->power);
@@ -149,7 +149,7 @@ static bool output_resolved(const Flow *fl, const Gauss *tab, int kind, double h
         return false;
     double goal = panel->decay[a] <= DECAY ? fl->tail : DAMPED_TAIL * fl->tail; /* hold_speeds */
     if (1.0 < stop->exponent && stop->exponent < ROUND) goal *= SHARP_TAIL;
-    if (is_rigid(fl, closed)) goal *= REST_TAIL;
+    if (is_held(fl, closed)) goal *= REST_TAIL;
     double floor = BLIND * noise[a] / deepest;
     double tail = larger(goal * fl->tail / s->forced[a], floor);
     double shake = 0.0; /* of the force by rounding: terms of a bond cancel where it is at rest */
@@ -162,7 +162,7 @@ static bool output_resolved(const Flow *fl, const Gauss *tab, int kind, double h
     if (o >= na && fastest > 0.0) /* by speed: its share in the force counts */
         size = larger(size, largest(F, m) / fastest);
     double kick = 1.0;
-    if (o < na && !is_rigid(fl, closed)) {
+    if (o < na && !is_held(fl, closed)) {
         kick = KICK * stop->mobility * largest(panel->slope + (size_t)o * m, m);
         kick = larger(kick * h / fl->omega, 1.0);
     }

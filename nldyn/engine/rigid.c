@@ -18,12 +18,14 @@
 #define LOW 10.0 /* a body that would rebound no higher than this many roundings of the gap stays */
 #define HIT_AGAIN 1e-3 /* rad of the excitation, within which a body that pushes off hits again */
 
-/* fill the rigid stops on which a body rests; how many */
-static int resting_stops(const Motion *M)
+/* fill the rigid stops on which a body rests, and the sliders that stick; how many */
+static int held_stops(const Motion *M, bool with_sliders)
 {
+    const Flow *fl = M->fl;
     int n = 0;
-    for (int s = 0; s < M->fl->n_stops; s++)
-        if (M->closed[s] && is_rigid(M->fl, s)) M->s->resting[n++] = s;
+    for (int s = 0; s < fl->n_stops; s++)
+        if (M->closed[s] && is_held(fl, s) && (with_sliders || is_rigid(fl, s)))
+            M->s->resting[n++] = s;
     return n;
 }
 
@@ -49,11 +51,13 @@ static void contact_forces(const Motion *M, double phase)
         rates[s] = at.second;
         forces[s] =
             M->closed[s] ? law(fl, s, at.value - stop_of(fl, s)->gap, at.first).force : 0.0;
+        if (M->closed[s] && is_pressed(fl, s)) /* it comes after what presses it on */
+            forces[s] = sliding_law(fl, s, at.first, forces[(int)stop_of(fl, s)->normal]).force;
     }
     for (int b = 0; b < n; b++)
         if (forces[b] != 0.0)
             for (int s = 0; s < n; s++) rates[s] -= between(fl, s, b) * forces[b];
-    int count = resting_stops(M);
+    int count = held_stops(M, true);
     if (count == 0) return;
     const int *stops = M->s->resting;
     factor_mobilities(M, count);
@@ -176,7 +180,7 @@ static void strike(Motion *M, int stop, double speed, Value restitution, double 
     for (int k = 0; k < fl->size; k++) M->w[k] -= push[k] * impulse;
 }
 
-/* fill s->offsets (count, 1 + n): gaps (rate 0) of the `resting` stops or their rates, and their
+/* fill s->offsets (count, 1 + n): gaps (rate 0) of the `resting` stops or the rates, and their
  * sensitivities */
 static void fill_offsets(const Motion *M, double phase, double t, const double *shift, int count,
                          int rate, int n)
@@ -186,7 +190,7 @@ static void fill_offsets(const Motion *M, double phase, double t, const double *
         int stop = M->s->resting[a];
         double *off = M->s->offsets + (size_t)a * (1 + n);
         Course at = output_now(fl, stop, M->w, phase);
-        off[0] = rate == 1 ? at.first : at.value - stop_of(fl, stop)->gap;
+        off[0] = rate == 1 ? at.first - stop_of(fl, stop)->belt : at.value - stop_of(fl, stop)->gap;
         if (n == 0) continue;
         shifted_columns(M, stop, rate, phase, t, shift, off + 1);
         for (int c = 0; c < fl->n_parameters; c++)
@@ -194,16 +198,18 @@ static void fill_offsets(const Motion *M, double phase, double t, const double *
     }
 }
 
-/* Shut the gaps of the stops that a body rests on, and stop their rates, in all sensitivities: by
- * a shift of the displacements along what an impulse moves, and by an impulse. */
+/* Shut the gaps of the stops that a body rests on, and stop their rates and those of the sliders
+ * that stick, in all sensitivities: by a shift of the displacements along what an impulse moves,
+ * and by an impulse. */
 static void hold(Motion *M, double phase, double t, const double *shift)
 {
     const Flow *fl = M->fl;
     Scratch *s = M->s;
-    int count = resting_stops(M), n = M->with_columns ? M->n_columns : 0;
-    if (count == 0) return;
-    factor_mobilities(M, count);
+    int n = M->with_columns ? M->n_columns : 0;
     for (int rate = 0; rate < 2; rate++) {
+        int count = held_stops(M, rate == 1);
+        if (count == 0) continue;
+        factor_mobilities(M, count);
         fill_offsets(M, phase, t, shift, count, rate, n);
         lu_apply(s->mobility, count, s->mobility_order, s->offsets, 1 + n);
         for (int a = 0; a < count; a++) {
@@ -218,6 +224,83 @@ static void hold(Motion *M, double phase, double t, const double *shift)
             }
         }
     }
+}
+
+/* let sliders slide whose speed is more than so many `roundings` */
+static void loosen_sliders(const Motion *M, double phase, double roundings)
+{
+    const Flow *fl = M->fl;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!(M->closed[s] && is_slider(fl, s)) || fl->slides[s] != 0) continue;
+        double speed = output_now(fl, s, M->w, phase).first - stop_of(fl, s)->belt;
+        double most = roundings * (rate_noise(fl, s, M->w) + SUM_ROUNDING * fabs(stop_of(fl, s)->belt));
+        if (fabs(speed) <= most) continue;
+        fl->slides[s] = speed > 0.0 ? 1 : -1;
+        M->panel->na = -1; /* its equations are others now */
+    }
+}
+
+/* let sliders slide that would need more than their friction to stick, the most loaded first */
+static void slip_overloaded(const Motion *M, double phase)
+{
+    const Flow *fl = M->fl;
+    for (int round = 0; round < fl->n_stops; round++) {
+        double most = 1.0;
+        int loosest = -1;
+        if (held_stops(M, true) == held_stops(M, false)) return;
+        contact_forces(M, phase);
+        const double *forces = M->s->stop_forces;
+        for (int s = 0; s < fl->n_stops; s++) {
+            if (!(M->closed[s] && is_slider(fl, s)) || fl->slides[s] != 0) continue;
+            double normal = is_pressed(fl, s) ? forces[(int)stop_of(fl, s)->normal]
+                                              : stop_of(fl, s)->pressing;
+            double load = fabs(forces[s]) / (grip(fl, s) * larger(normal, 0.0));
+            if (!(load > most)) continue;
+            most = load;
+            loosest = s;
+        }
+        if (loosest < 0) return;
+        fl->slides[loosest] = forces[loosest] > 0.0 ? 1 : -1;
+        M->panel->na = -1;
+    }
+}
+
+/* let what sticks at the start of a segment slip where it would need more than its friction */
+static void begin_sliders(Motion *M)
+{
+    if (held_stops(M, true) == held_stops(M, false)) return;
+    slip_overloaded(M, M->phase);
+    for (int c = 0; c < M->n_columns; c++) M->s->moved_shift[c] = 0.0;
+    hold(M, M->phase, 0.0, M->s->moved_shift);
+}
+
+/* A slider comes to rest, or slips, a time t after the start. Its force jumps as it comes to rest:
+ * sensitivities change as in an impact, by the shift of that instant. */
+static void slide_or_stick(Motion *M, int s, double phase, double t)
+{
+    const Flow *fl = M->fl;
+    double *shift = M->s->moved_shift;
+    contact_forces(M, phase);
+    M->panel->na = -1;
+    if (fl->slides[s] == 0) {
+        fl->slides[s] = M->s->stop_forces[s] > 0.0 ? 1 : -1;
+        return;
+    }
+    double pace = M->s->pushes[s]; /* its acceleration */
+    for (int c = 0; c < M->n_columns; c++) shift[c] = 0.0;
+    if (M->with_columns) {
+        state_rate(M);
+        output_columns(fl, s, 1, phase, t, M->columns, M->n_columns, shift);
+        for (int c = 0; c < M->n_columns; c++) shift[c] /= -pace;
+        move(M, 1.0, shift);
+    }
+    fl->slides[s] = 0;
+    slip_overloaded(M, phase);
+    hold(M, phase, t, shift);
+    if (!M->with_columns) return;
+    contact_forces(M, phase);
+    state_rate(M);
+    move(M, -1.0, shift);
 }
 
 /* close the rigid stops that are shut and do not part; a body that an impact on another stop has
@@ -316,6 +399,7 @@ static void impact(Motion *M, int first, bool crossed, double phase, double t)
         M->bounces[hit]++;
         M->closings[hit]++;
     }
+    loosen_sliders(M, phase, SHUT);
     settle(M, first, phase, t, shift, SHUT, struck);
     for (int s = 0; s < fl->n_stops; s++) {
         if (!(struck[s] && M->closed[s] && M->bounces[s] > 0)) continue;

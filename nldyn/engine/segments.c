@@ -13,14 +13,19 @@ static void jump_columns(Motion *M, int stop, double phase, double t, bool close
 {
     const Flow *fl = M->fl;
     double *depth = M->s->moved, dashpot = stop_of(fl, stop)->dashpot;
-    const double *push = push_of(fl, stop);
     output_columns(fl, stop, 0, phase, t, M->columns, M->n_columns, depth);
     for (int c = 0; c < fl->n_parameters; c++)
         if (is_parameter(fl, c, GAP, stop)) depth[fl->size + c] -= 1.0;
     double impulse = closes ? -dashpot : dashpot;
-    for (int k = 0; k < fl->size; k++)
-        for (int c = 0; c < M->n_columns; c++)
-            M->columns[(size_t)k * M->n_columns + c] += impulse * push[k] * depth[c];
+    for (int s = stop; s < fl->n_stops; s++) {
+        bool slides = is_pressed(fl, s) && (int)stop_of(fl, s)->normal == stop;
+        if (s != stop && !(slides && fl->slides[s] != 0)) continue;
+        double share = s == stop ? 1.0 : friction_at(fl, s, output_now(fl, s, M->w, phase).first).value;
+        const double *push = push_of(fl, s);
+        for (int k = 0; k < fl->size; k++)
+            for (int c = 0; c < M->n_columns; c++)
+                M->columns[(size_t)k * M->n_columns + c] += impulse * share * push[k] * depth[c];
+    }
 }
 
 /* Whether the force jumps as a stop opens or closes. That of one that never pulls does so only
@@ -35,6 +40,15 @@ static bool force_jumps(const Motion *M, int stop, double phase)
 static void switch_stop(Motion *M, int stop, double phase, double t)
 {
     M->closed[stop] = !M->closed[stop];
+    for (int s = stop + 1; s < M->fl->n_stops; s++) {
+        if (!is_pressed(M->fl, s) || (int)stop_of(M->fl, s)->normal != stop) continue;
+        M->closed[s] = M->closed[stop];
+        M->fl->slides[s] = 0;
+    }
+    if (M->closed[stop]) {
+        loosen_sliders(M, phase, SHUT);
+        slip_overloaded(M, phase);
+    }
     if (M->with_columns && force_jumps(M, stop, phase))
         jump_columns(M, stop, phase, t, M->closed[stop]);
 }
@@ -75,7 +89,9 @@ static void pass_event(Motion *M, int event, double h)
 {
     double here = M->phase + M->fl->omega * M->t;
     M->start_switch = 0;
-    if (is_rigid(M->fl, event)) {
+    if (is_slider(M->fl, event)) {
+        slide_or_stick(M, event, here, M->t);
+    } else if (is_rigid(M->fl, event)) {
         if (M->closed[event])
             M->closed[event] = false;
         else
@@ -96,6 +112,7 @@ static int fly(Motion *M, double here)
     double first = M->duration - M->t;
     int stop = -1;
     for (int s = 0; s < fl->n_stops; s++) {
+        if (is_slider(fl, s)) continue; /* nothing presses it on */
         double at = closing_time(fl, s, M->w, here, M->skips[s], first, M->shortest);
         if (at < 0.0) return fl->watch->stopped ? INTERRUPTED : TOO_MANY_STEPS;
         if (at < first) {
@@ -191,7 +208,7 @@ static int touch(Motion *M, double here, int na)
     int stop = M->active[0], status = GOES_ON;
     double remain = M->duration - M->t;
     if (!same_stops(panel, M->active, na)) renew_panel(fl, panel, M->active, na);
-    if (na == 1 && M->start_switch == 1 && !M->bonded && !is_rigid(fl, stop)) {
+    if (na == 1 && M->start_switch == 1 && is_elastic(fl, stop)) {
         bool passed = pass_touch(M, stop, here, &status);
         if (passed || status != GOES_ON) return status;
     }
@@ -268,14 +285,18 @@ static void begin_contacts(Motion *M)
     for (int s = 0; s < fl->n_stops; s++) {
         Course at = output_now(fl, s, M->w, M->phase);
         double left = at.first < 0.0 ? output_noise(fl, s, M->w) : 0.0; /* it opens now */
-        bool shut = at.value - stop_of(fl, s)->gap > left && !is_rigid(fl, s);
+        bool shut = at.value - stop_of(fl, s)->gap > left && is_elastic(fl, s);
+        fl->slides[s] = 0;
         M->closed[s] = is_bond(fl, s) || shut;
+        if (is_slider(fl, s))
+            M->closed[s] = !is_pressed(fl, s) || M->closed[(int)stop_of(fl, s)->normal];
         if (!(never_pulls(fl, s) && M->closed[s])) continue;
         int release = (int)stop_of(fl, s)->release;
         at = output_now(fl, release, M->w, M->phase);
         left = at.first < 0.0 ? output_noise(fl, release, M->w) : 0.0;
         M->closed[s] = at.value - stop_of(fl, s)->gap > left;
     }
+    loosen_sliders(M, M->phase, AT_START);
 }
 
 /* fill w and its sensitivities from the state z (2n,) at the start of a segment */
@@ -341,6 +362,7 @@ static int propagate(Motion *M, const double *start, double phase, double durati
     for (int s = 0; s < M->fl->n_stops; s++) M->bounces[s] = 0;
     begin_contacts(M);
     begin_on_rigid_stops(M);
+    begin_sliders(M);
     begin_pieces(M, fastest);
     int status = run_pieces(M);
     finish(M, outcome);

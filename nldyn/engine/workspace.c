@@ -45,6 +45,7 @@ static void lay_out_flow(Block *block, const System *sys, int n_parameters,
     fl->node_angle = sys->node_angle;
     size_t amplitudes = (1 + most_terms(sys)) * (2 + (size_t)n_parameters);
     fl->pushes = numbers(block, (size_t)fl->n_stops * fl->size);
+    fl->slides = indices(block, fl->n_stops);
     fl->terms = room(block, most_terms(sys), sizeof(Term));
     fl->response = room(block, amplitudes * fl->size, sizeof(Complex));
     fl->forced = room(block, amplitudes * fl->n_out, sizeof(Complex));

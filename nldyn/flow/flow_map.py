@@ -49,7 +49,7 @@ from nldyn.engine.newton import Corrector, Found, newton, packed_record, packed_
 from nldyn.engine.sample import local_extremes, sample_states
 from nldyn.flow.gauss import GaussTables, gauss_tables
 from nldyn.flow.options import FlowOptions, _floats, _nodes_for_switch
-from nldyn.flow.packing import bond_row, parameter_tables, stop_row
+from nldyn.flow.packing import bond_row, parameter_tables, slider_row, stop_row
 from nldyn.system.contact_law import law_address
 from nldyn.system.linear import ForcedResponse
 from nldyn.system.parameters import Parameter
@@ -246,7 +246,7 @@ class FlowMap:
 
     @cached_property
     def rows(self) -> Real:
-        """Output rows (n_out, 2n): penetrations, displacements at bonds, then of interfaces.
+        """Output rows (n_out, 2n): penetrations, displacements of sliders, bonds, interfaces.
 
         Then, of each stop that never pulls, its force over its stiffness.
         """
@@ -261,22 +261,21 @@ class FlowMap:
 
     @cached_property
     def _pushed(self) -> list[Real]:
-        """Modal vectors (n,) of what the forces of the stops, then of the bonds, push."""
+        """Modal vectors (n,) of what the forces of stops, sliders and bonds push, in this order."""
         s = self.system
-        return [s.stop_vector(stop) for stop in s.stops] + [
-            s.vector_between(bond.at, bond.against) for bond in s.bonds
-        ]
+        between = [(e.at, e.against) for e in s.sliders] + [(e.at, e.against) for e in s.bonds]
+        return [s.stop_vector(stop) for stop in s.stops] + [s.vector_between(*e) for e in between]
 
     @cached_property
     def force_columns(self) -> Real:
-        """What the forces of stops and bonds do to the rates of z, (2n, n_forces)."""
+        """What the forces of stops, sliders and bonds do to the rates of z, (2n, n_forces)."""
         columns = [self.system.force_column(v) for v in self._pushed]
         return np.ascontiguousarray(np.array(columns).reshape(-1, 2 * self.system.size).T)
 
     def ride(self, output: int, omega: float) -> Ride:
         """What a moving base adds to an output at ω, see `System.with_absolute`."""
         s = self.system
-        place = output - len(s.stops) - len(s.bonds)
+        place = output - len(self._pushed)
         observed = 0 <= place < len(s.interfaces)
         return s.ride(s.interfaces[place], omega) if observed else NO_RIDE
 
@@ -327,12 +326,18 @@ class FlowMap:
             for stop, v in zip(s.stops, vectors, strict=False)
         ]
         stops += [
+            slider_row(slider, float(v @ v), self.options)
+            for slider, v in zip(s.sliders, vectors[len(s.stops) :], strict=False)
+        ]
+        first_bond = len(stops)
+        stops += [
             bond_row(bond, float(v @ v))
-            for bond, v in zip(s.bonds, vectors[len(s.stops) :], strict=True)
+            for bond, v in zip(s.bonds, vectors[first_bond:], strict=True)
         ]
         powers = np.zeros((len(stops), max((len(b.coefficients) for b in s.bonds), default=0)))
-        for row, bond in enumerate(s.bonds, len(s.stops)):
+        for row, bond in enumerate(s.bonds, first_bond):
             powers[row, : len(bond.coefficients)] = bond.coefficients
+        unlawful = len(vectors) - len(s.stops)
         return SystemData(
             linear.blocks,
             np.array([self.rows, self.rate_rows, accelerations]),
@@ -341,7 +346,7 @@ class FlowMap:
             np.ones(1),
             np.zeros((1, 3, 2 * s.size), dtype=complex),
             np.hstack([np.array(stops, dtype=float).reshape(-1, len(StopRow._fields)), powers]),
-            np.array([law_address(e.law) for e in s.stops] + [0] * len(s.bonds), dtype=np.int64),
+            np.array([law_address(e.law) for e in s.stops] + [0] * unlawful, dtype=np.int64),
             self.options.panel_tail,
             self.options.node_angle,
         )
@@ -585,7 +590,7 @@ class FlowMap:
             sensitivities, table, drive_by, corrector or _NONE, 2 * self.system.size,
             len(self._pushed),
         )  # fmt: skip
-        if self.system.bonds:  # which come after the stops, and never close
+        if self.system.bonds or self.system.sliders:  # which come after the stops, and never close
             return found._replace(closings=found.closings[: len(self.system.stops)])
         return found
 

@@ -14,7 +14,8 @@ from nldyn.base.errors import check_types
 from nldyn.engine.layout import FIRST_POWER, StopRow
 from nldyn.flow.options import FlowOptions
 from nldyn.system.contact_law import duration_factor
-from nldyn.system.parameters import OF_SPRINGS, OF_STOPS, Parameter, check_exact
+from nldyn.system.friction import Slider
+from nldyn.system.parameters import OF_SLIDERS, OF_SPRINGS, OF_STOPS, Parameter, check_exact
 from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.springs_dampers import Bond
 from nldyn.system.system import System
@@ -57,6 +58,21 @@ def bond_row(bond: Bond, mobility: float) -> StopRow:
     return _NO_STOP._replace(mobility=mobility, bond=1.0, drag=bond.drag, cubic=bond.cubic)
 
 
+def slider_row(slider: Slider, mobility: float, options: FlowOptions) -> StopRow:
+    """Numbers of a slider as the engine takes them."""
+    friction = slider.friction
+    return _NO_STOP._replace(
+        mobility=mobility,
+        instant=options.instant(0.0),
+        friction=friction.coefficient,
+        adhesion=friction.adhesion,
+        fading=friction.fading_speed or 0.0,
+        belt=friction.base_speed,
+        normal=float(slider.stop),
+        pressing=slider.normal_force,
+    )
+
+
 def parameter_tables(
     system: System, parameters: Sequence[Parameter]
 ) -> tuple[NDArray[np.int64], Complex]:
@@ -77,10 +93,14 @@ def parameter_tables(
         name, index = parameter.name, parameter.index
         if name in _COLUMNS:
             table[row] = _COLUMNS[name], index
+        elif name in OF_SLIDERS:
+            column = {"friction": "friction", "normal_force": "pressing"}[name]
+            table[row] = StopRow._fields.index(column), len(system.stops) + index
         elif name in OF_SPRINGS:
             spring = system.springs[index]
             place = [(bond.at, bond.against) for bond in system.bonds]
-            bond = len(system.stops) + place.index((spring.at, spring.against))
+            before = len(system.stops) + len(system.sliders)
+            bond = before + place.index((spring.at, spring.against))
             table[row] = FIRST_POWER + OF_SPRINGS.index(name), bond
         else:
             table[row] = _EXCITATION, index

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.flow.flow_map import FlowMap, Trajectory
+from nldyn.system.friction import Slider
 
 SHUT = 1e-13  # of the displacements that add up to that at a stop: a gap counts as closed
 BEHIND = 1e-9  # of them: depth of a state that lies behind a rigid stop
@@ -185,13 +186,38 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
     for i, stop in system.elastic_stops.items():
         pushed = stop.force(states @ flow.rows[i] - stop.gap, states @ flow.rate_rows[i])
         rates -= pushed[:, None] * data.force[:, i]
-    for i, bond in enumerate(system.bonds, len(system.stops)):
+    first = len(system.stops)
+    slips = np.zeros((len(phases), len(system.sliders)), dtype=bool)
+    for i, slider in enumerate(system.sliders, first):
+        speed = states @ flow.rate_rows[i] - slider.friction.base_speed
+        moves = np.abs(speed) > STILL * (np.abs(states) @ np.abs(flow.rate_rows[i]))
+        slips[:, i - first] = moves
+        slid = np.where(moves, np.sign(speed) * slider.friction.at(speed), 0.0)
+        rates -= (slid * _normal_force(flow, slider, states))[:, None] * data.force[:, i]
+    for i, bond in enumerate(system.bonds, first + len(system.sliders)):
         pulled = bond.force(states @ flow.rows[i], states @ flow.rate_rows[i])
         rates -= pulled[:, None] * data.force[:, i]
-    rows = flow.rate_rows[rigid]
-    pace = states @ data.rows[2, rigid].T + rates @ rows.T
-    mobility = rows @ data.force[:, rigid]
+    acting = np.r_[rigid, first : first + len(system.sliders)]
+    rows = flow.rate_rows[acting]
+    pace = states @ data.rows[2, acting].T + rates @ rows.T
+    mobility = rows @ data.force[:, acting]
     for k in np.flatnonzero(rests.any(axis=1)):
-        held = np.flatnonzero(rests[k])
-        forces[k, rigid[held]] = np.linalg.solve(mobility[np.ix_(held, held)], pace[k, held])
+        held = np.flatnonzero(np.r_[rests[k], ~slips[k] & _pressed(flow, states[k])])
+        found = np.linalg.solve(mobility[np.ix_(held, held)], pace[k, held])
+        forces[k, rigid[held[held < rigid.size]]] = found[held < rigid.size]
     return forces
+
+
+def _normal_force(flow: FlowMap, slider: Slider, states: Real) -> Real:
+    """What presses a slider on at states (k, 2n), in N."""
+    if slider.stop < 0:
+        return np.full(len(states), slider.normal_force)
+    stop = flow.system.elastic_stops[slider.stop]
+    row, rate = flow.rows[slider.stop], flow.rate_rows[slider.stop]
+    return stop.force(states @ row - stop.gap, states @ rate)
+
+
+def _pressed(flow: FlowMap, state: Real) -> NDArray[np.bool_]:
+    """Which sliders something presses on."""
+    forces = [_normal_force(flow, slider, state[None])[0] for slider in flow.system.sliders]
+    return np.array(forces, dtype=float) > 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, astuple, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
 from nldyn.io.hdf5 import Group, put, set_attribute
 from nldyn.system.contact_law import ContactLaw
+from nldyn.system.friction import DryFriction, Friction
 from nldyn.system.linear import LinearPart
 from nldyn.system.loads import BaseMotion, ConstantForce, Excitation, HarmonicForce, Unbalance
 from nldyn.system.parameters import strength
@@ -79,11 +80,14 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     _write_basis(group, system)
     _write_rigid_stops(group, system)
     _write_elastic_stops(group, tuple(system.elastic_stops.values()))
+    viscous = [d for d in system.dampers if not isinstance(d, DryFriction)]
     _write_columns(
         group.create_group("dampers"),
-        {"at": [d.at for d in system.dampers], **_ends(system.dampers), **_drags(system.dampers)},
-        {"coefficient": ("N s/m", [d.coefficient for d in system.dampers])},
+        {"at": [d.at for d in viscous], **_ends(viscous), **_drags(viscous)},
+        {"coefficient": ("N s/m", [d.coefficient for d in viscous])},
     )
+    if system.sliders:
+        set_attribute(group, "friction", json.dumps(_told_friction(system)))
     if system.springs:
         _write_springs(group, system.springs)
     sources = system.excitation
@@ -95,6 +99,41 @@ def write_flow(group: Any, flow: FlowMap) -> None:
             "phase_deg": ("degree", [getattr(s, "phase_deg", 0.0) for s in sources]),
         },
     )
+
+
+def _told_friction(system: System) -> dict[str, Any]:
+    """Dry friction by the places of its stops and dampers."""
+    return {
+        "stops": {
+            place: [stop.tangent, stop.tangent_against, astuple(stop.friction)]
+            for place, stop in enumerate(system.stops)
+            if isinstance(stop, Stop) and isinstance(stop.friction, Friction)
+        },
+        "dampers": {
+            place: [damper.at, damper.normal_force, astuple(damper.friction), damper.against]
+            for place, damper in enumerate(system.dampers)
+            if isinstance(damper, DryFriction) and isinstance(damper.friction, Friction)
+        },
+    }
+
+
+def _with_friction(
+    group: Group, stops: tuple[AnyStop, ...], dampers: tuple[AnyDamper, ...]
+) -> tuple[tuple[AnyStop, ...], tuple[AnyDamper, ...]]:
+    """Stops and dampers with what `_told_friction` told."""
+    if not group.has_attribute("friction"):
+        return stops, dampers
+    rough, all_dampers = list(stops), list(dampers)
+    try:
+        told = json.loads(group.text("friction"))
+        for place, (tangent, against, law) in told["stops"].items():
+            own = {"tangent": tangent, "tangent_against": against, "friction": Friction(*law)}
+            rough[int(place)] = replace(rough[int(place)], **own)
+        for place, (at, normal, law, against) in told["dampers"].items():
+            all_dampers.insert(int(place), DryFriction(at, normal, Friction(*law), against))
+    except (ValueError, TypeError, KeyError, AttributeError, IndexError):
+        raise group.fault("attribute", "friction", "does not tell what slides") from None
+    return tuple(rough), tuple(all_dampers)
 
 
 def _write_modes(group: Any, system: System) -> None:
@@ -286,8 +325,7 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
             omega,
             group.array("damping", n, n),
             dict(zip(names, vectors, strict=True)),
-            _read_stops(group, laws),
-            _read_dampers(group.group("dampers")),
+            *_with_friction(group, _read_stops(group, laws), _read_dampers(group.group("dampers"))),
             _read_excitation(group.group("excitation")),
             _read_loads(group, n),
             _read_springs(group.group("springs")) if "springs" in group else (),

@@ -15,6 +15,7 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.newton import check_bounded, first_orbit, guessed_nodes
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import shooting_problem
+from nldyn.system.friction import DryFriction
 from nldyn.system.system import System
 
 PROBE, SHORTEST_STEP = 1e-4, 1e-5  # in the logarithm of the factor
@@ -94,8 +95,11 @@ class Homotopy:
 
 
 def _more_damped(system: System, factor: float) -> System:
-    """The system with all of its damping times a factor."""
-    dampers = tuple(replace(d, coefficient=factor * d.coefficient) for d in system.dampers)
+    """The system with all of its damping but dry friction times a factor."""
+    dampers = tuple(
+        d if isinstance(d, DryFriction) else replace(d, coefficient=factor * d.coefficient)
+        for d in system.dampers
+    )
     return replace(system, damping=factor * system.damping, dampers=dampers)
 
 

@@ -34,6 +34,7 @@ def undamped(scene: Scene) -> Scene:
     changed: dict[str, object] = {
         "damping": DampingTable(),
         "dampers": [],
+        "friction": [],
         "excitation": [e for e in scene.excitation if e.kind in ("constant", "weight")],
     }
     if scene.observe is not None:

@@ -378,7 +378,7 @@ def _check_rides(scene: Scene, system: System) -> None:
     if scene.modal is not None:
         return
     bases = [source for source in system.excitation if isinstance(source, BaseMotion)]
-    for table in ("stops", "springs", "dampers") if bases else ():
+    for table in ("stops", "friction", "springs", "dampers") if bases else ():
         for number, element in enumerate(getattr(scene, table)):
             if element.against is None:
                 continue

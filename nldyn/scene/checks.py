@@ -557,13 +557,13 @@ def _check_explore(scene: Scene, report: Report) -> None:
 
 
 def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
-    for table in ("dampers", "stops", "excitation"):
+    for table in ("dampers", "stops", "friction", "excitation"):
         for number, entry in enumerate(getattr(scene, table)):
             if entry.at is not None:
                 yield (table, number, "at"), entry.at
     for number, spring in scene.interface_springs.items():
         yield ("springs", number, "at"), spring.at
-    for kind in ("stops", "dampers", "springs"):
+    for kind in ("stops", "friction", "dampers", "springs"):
         for number, entry in enumerate(getattr(scene, kind)):
             if entry.against is not None:
                 yield (kind, number, "against"), entry.against

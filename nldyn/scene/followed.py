@@ -8,7 +8,7 @@ from nldyn.scene.checks import STEADY
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import KeyPath, scene_error, unknown_name
 from nldyn.scene.schema import Scene
-from nldyn.scene.stops_and_loads import sources_before
+from nldyn.scene.stops_and_loads import slider_of, sources_before
 from nldyn.system.chart import EVERY_MODE, SPEED, SPIN, THE_FREQUENCY
 from nldyn.system.parameters import OF_STOPS, SOURCES, Parameter
 from nldyn.system.system import System
@@ -18,6 +18,7 @@ OF_LISTS = {  # the keys of each list of tables that may change
     "stops": OF_STOPS,
     "excitation": SOURCES,
     "dampers": ("coefficient",),
+    "friction": ("coefficient", "normal_force"),
     "springs": ("stiffness", "coefficients"),
 }
 SHORT = {
@@ -80,6 +81,12 @@ def _of_element(scene: Scene, kind: str, number: int, key: list[str]) -> Paramet
     name = f"{kind}.{number}.{key[0]}"
     if kind == "dampers" and table.law != "linear":
         raise _refused(scene, f"names '{name}', but only that of a linear damper may change")
+    if kind == "friction":
+        if getattr(table, key[0]) is None:
+            raise _refused(scene, f"names '{name}', but a stop presses that on")
+        return Parameter(
+            "friction" if key[0] == "coefficient" else key[0], slider_of(scene, number)
+        )
     if kind == "excitation":
         if getattr(table, key[0]) is None or table.kind == "base":
             fault = f"names '{name}', which one of kind '{table.kind}' has not, or must keep"

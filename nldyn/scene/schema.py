@@ -575,6 +575,39 @@ class DamperTable(Table):
         return self
 
 
+class FrictionTable(Table):
+    """``[[friction]]``: [dry friction](../how-to/friction.md) along an interface."""
+
+    at: str
+    """Interface whose displacement lies along the surface."""
+    coefficient: NotNegative
+    """Coefficient μ of Coulomb's friction while it slides."""
+    normal_force: Positive | None = None
+    """[N] Constant force that presses it on. This, or `stop`."""
+    stop: Annotated[int, Field(ge=0)] | None = None
+    """Number of the stop whose force presses it on, counted from 0: friction acts while it is
+    closed."""
+    at_rest: NotNegative | None = None
+    """Coefficient at rest, at least `coefficient`; the same unless given."""
+    fading_speed: Positive | None = None
+    """[m/s] Speed in which the coefficient falls from that at rest by 1 − 1/e of the difference.
+    Needed where `at_rest` is larger."""
+    base_speed: Number = 0.0
+    """[m/s] Speed along the surface of what it slides on: of a belt or a rotor."""
+    against: str | None = None
+    """Interface at the other side; the ground unless given."""
+
+    @model_validator(mode="after")
+    def _two_ends(self) -> FrictionTable:
+        _refuse_own(self)
+        _exactly_one(self, "normal_force", "stop")
+        if self.at_rest is not None and self.at_rest < self.coefficient:
+            raise ValueError("needs an 'at_rest' of at least 'coefficient'")
+        if (self.at_rest or 0.0) > self.coefficient and self.fading_speed is None:
+            raise ValueError("has an 'at_rest' above 'coefficient', which needs a 'fading_speed'")
+        return self
+
+
 class StopTable(Table):
     """``[[stops]]``: a stop that an interface hits."""
 
@@ -1034,6 +1067,7 @@ class Scene(StructureTables):
     damping: DampingTable = DampingTable()
     dampers: list[DamperTable] = []
     stops: list[AnyStopTable] = []
+    friction: list[FrictionTable] = []
     excitation: list[ExcitationTable] = []
     observe: ObserveTable | None = None
     start: StartTable | None = None
@@ -1118,7 +1152,7 @@ def _exactly_one(table: BaseModel, *names: str) -> None:
         raise ValueError(f"{fault} {listed}" + ("; keep one" if given else ""))
 
 
-def _refuse_own(table: StopTable | SpringTable | DamperTable | JointTable) -> None:
+def _refuse_own(table: StopTable | FrictionTable | SpringTable | DamperTable | JointTable) -> None:
     if table.against == table.at:
         raise ValueError("needs another interface than its own in 'against'")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from nldyn.scene.schema import (
     DamperTable,
     ElasticStopTable,
     ExcitationTable,
+    FrictionTable,
     HertzStopTable,
     LinearStopTable,
     RigidStopTable,
@@ -20,6 +22,7 @@ from nldyn.scene.schema import (
     SpringTable,
     StopTable,
 )
+from nldyn.system.friction import DryFriction, Friction
 from nldyn.system.loads import BaseMotion, ConstantForce, Excitation, HarmonicForce, Unbalance
 from nldyn.system.measured import MeasuredForce, measured_force
 from nldyn.system.rigid_stop import AnyStop, RigidStop
@@ -34,8 +37,8 @@ def acting_elements(scene: Scene) -> Elements:
     """The stops, dampers and excitation of a scene; a `SceneError` says what is wrong with one."""
     with told_as(scene, (), SystemModelError):
         return Elements(
-            stops=tuple(_stop(stop) for stop in scene.stops),
-            dampers=tuple(_damper(damper) for damper in scene.dampers),
+            stops=_rough(scene, [_stop(stop) for stop in scene.stops]),
+            dampers=(*map(_damper, scene.dampers), *map(_dry, dry_tables(scene))),
             excitation=tuple(
                 source
                 for number, table in enumerate(scene.excitation)
@@ -50,6 +53,50 @@ def _damper(table: DamperTable) -> AnyDamper:
         return Damper(table.at, table.coefficient, table.against)
     by = "speed" if table.law == "cubic" else table.law
     return CubicDamper(table.at, table.coefficient, table.against, by)
+
+
+def dry_tables(scene: Scene) -> list[FrictionTable]:
+    """The tables of what a constant force presses on."""
+    return [table for table in scene.friction if table.stop is None]
+
+
+def slider_of(scene: Scene, number: int) -> int:
+    """Which of the sliders of a system a table of friction is: those of stops come first."""
+    stops = sorted(table.stop for table in scene.friction if table.stop is not None)
+    table = scene.friction[number]
+    if table.stop is not None:
+        return stops.index(table.stop)
+    return len(stops) + sum(other.stop is None for other in scene.friction[:number])
+
+
+def _law_of_friction(table: FrictionTable) -> Friction:
+    return Friction(table.coefficient, table.at_rest, table.fading_speed, table.base_speed)
+
+
+def _dry(table: FrictionTable) -> DryFriction:
+    assert table.normal_force is not None
+    return DryFriction(table.at, table.normal_force, _law_of_friction(table), table.against)
+
+
+def _rough(scene: Scene, stops: list[AnyStop]) -> tuple[AnyStop, ...]:
+    """The stops with the friction of those that have some."""
+    for number, table in enumerate(scene.friction):
+        if table.stop is None:
+            continue
+        if table.stop >= len(stops):
+            known = f"there are {len(stops)}, counted from 0" if stops else "there are none"
+            fault = f"is {table.stop}, but no stop has that number; {known}"
+            raise scene_error(scene.file, ("friction", number, "stop"), fault)
+        stop = stops[table.stop]
+        if not isinstance(stop, Stop) or stop.friction is not None:
+            fault = "is one that has friction already" if isinstance(stop, Stop) else "is rigid"
+            fault += ": give each stop one friction" if isinstance(stop, Stop) else ", without any"
+            raise scene_error(scene.file, ("friction", number, "stop"), fault)
+        law = _law_of_friction(table)
+        stops[table.stop] = replace(
+            stop, tangent=table.at, friction=law, tangent_against=table.against
+        )
+    return tuple(stops)
 
 
 def _spring(table: SpringTable) -> AnySpring:

@@ -17,7 +17,9 @@ from nldyn.base.errors import (
     is_finite,
     shown,
 )
+from nldyn.system.friction import DryFriction
 from nldyn.system.parameters import (
+    OF_SLIDERS,
     OF_SPRINGS,
     OF_STOPS,
     SOURCES,
@@ -50,6 +52,8 @@ UNITS = {
     "amplitude": "N",
     "mass_times_radius": "kg m",
     "force": "N",
+    "friction": "1",
+    "normal_force": "N",
     "coefficient": "N s/m",
     "spring_stiffness": "N/m",
     "modal_damping": "1",
@@ -57,15 +61,22 @@ UNITS = {
 } | {name: f"N/m^{name[1:]}" for name in OF_SPRINGS}
 BOUNDS = {
     name: (0.0, math.inf)
-    for name in ("stiffness", "dissipation", "dashpot", *SOURCES, *_OF_DAMPERS, *_OF_MODES)
+    for name in (
+        *("stiffness", "dissipation", "dashpot", *SOURCES, *OF_SLIDERS),
+        *(*_OF_DAMPERS, *_OF_MODES),
+    )
     if name != "force"  # has either sign
 } | {  # between which there are systems
     "exponent": (1.0, LARGEST_EXPONENT),
     "restitution": (0.0, 1.0),
 }
-POSITIVE = ("stiffness", "natural_frequency_hz")  # there is no system where they are zero
+POSITIVE = (
+    "stiffness",
+    "normal_force",
+    "natural_frequency_hz",
+)  # there is no system where they are zero
 NAMES = (
-    *(FREQUENCY, *_OF_STOPS, *SOURCES, *_OF_DAMPERS, *_OF_SPRINGS),
+    *(FREQUENCY, *_OF_STOPS, *SOURCES, *OF_SLIDERS, *_OF_DAMPERS, *_OF_SPRINGS),
     *(*OF_SPRINGS, *_OF_MODES, SPIN, SPEED),
 )
 THE_FREQUENCY = Parameter(FREQUENCY)
@@ -124,7 +135,7 @@ class OwnParameter(Parameter):
 
 def has_exact_derivatives(parameter: Parameter) -> bool:
     """Whether the flow map differentiates by the parameter itself."""
-    return parameter.name in (*_OF_STOPS, *SOURCES, *OF_SPRINGS)
+    return parameter.name in (*_OF_STOPS, *SOURCES, *OF_SLIDERS, *OF_SPRINGS)
 
 
 def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
@@ -136,8 +147,8 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
         The system that must have it.
     parameter : str or Parameter
         An `OwnParameter`, or frequency_hz; gap, stiffness, exponent, dissipation, dashpot or
-        restitution of a stop; amplitude, mass_times_radius or force of an excitation; coefficient
-        of a damper; spring_stiffness of a linear spring; k1, k2, ... of a polynomial one;
+        restitution of a stop; amplitude, mass_times_radius or force of an excitation; friction or
+        normal_force of a slider; coefficient of a damper; spring_stiffness of a linear spring; k1, k2, ... of a polynomial one;
         modal_damping (ratio) or natural_frequency_hz of a mode; spin_hz of a system with a `Spin`,
         or speed_hz, which is spin and frequency in one where they are equal. The index -1 of
         modal_damping means all modes, which then have one ratio.
@@ -159,6 +170,11 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
         check_exact(system, parameter)
     elif parameter.name in _OF_DAMPERS:
         check_index(parameter, "damper", len(system.dampers))
+        if isinstance(system.dampers[parameter.index], DryFriction):
+            raise SystemModelError(
+                f"parameter 'coefficient': damper {parameter.index} is dry friction: follow "
+                "'friction' or 'normal_force'"
+            )
     elif parameter.name in _OF_SPRINGS:
         check_index(parameter, "spring", len(system.springs))
         if isinstance(system.springs[parameter.index], PolynomialSpring):
@@ -270,8 +286,12 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
         return float(system.frequencies_hz[index])
     if name in OF_SPRINGS:
         return float(_polynomial(system, index).coefficients[int(name[1:]) - 1])
+    if name == "friction":
+        return system.sliders[index].friction.coefficient
     elements: Sequence[Any] = system.stops
-    if name in SOURCES:
+    if name in OF_SLIDERS:
+        elements = system.sliders
+    elif name in SOURCES:
         elements = system.excitation
     elif name in _OF_DAMPERS:
         elements = system.dampers
@@ -308,6 +328,8 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
         return system.with_elements(
             springs=_replaced(system.springs, index, "coefficients", tuple(values))
         )
+    if name in OF_SLIDERS:
+        return system.with_slider(index, OF_SLIDERS[name], value)
     if name in SOURCES:
         return system.with_elements(excitation=_replaced(system.excitation, index, name, value))
     if name in _OF_DAMPERS:

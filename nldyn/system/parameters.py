@@ -11,6 +11,7 @@ from nldyn.system.system import System
 
 OF_STOPS = ("gap", "stiffness", "exponent", "dissipation", "dashpot", "restitution")
 OF_SPRINGS = tuple(f"k{power}" for power in range(1, LARGEST_DEGREE + 1))
+OF_SLIDERS = {"friction": "coefficient", "normal_force": "normal_force"}  # and what it is there
 SOURCES = ("amplitude", "mass_times_radius", "force")
 
 
@@ -36,9 +37,11 @@ class Parameter:
     name : str
         gap, stiffness, exponent, dissipation, dashpot or restitution of a stop (not of one with a
         law of its own, but for the gap), amplitude, mass_times_radius or force of an excitation;
-        k1, k2, ..., the coefficients of a polynomial spring.
+        k1, k2, ..., the coefficients of a polynomial spring; friction (the coefficient) and
+        normal_force of a slider.
     index : int
-        Which of the stops, excitations, springs, dampers or modes of the system.
+        Which of the stops, excitations, springs, sliders (`System.sliders`), dampers or modes of
+        the system.
 
     Raises
     ------
@@ -99,8 +102,14 @@ def check_exact(system: System, parameter: Parameter) -> None:
                 f"parameter '{name}': spring {index} has no such coefficient"
                 + ("; that of a linear one is spring_stiffness" if degree == 0 else "")
             )
+    elif name in OF_SLIDERS:
+        check_index(parameter, "slider", len(system.sliders))
+        if name == "normal_force" and system.sliders[index].stop >= 0:
+            raise SystemModelError(
+                f"parameter '{name}': a stop presses slider {index} on, no constant force"
+            )
     else:
-        known = ", ".join([*OF_STOPS, *SOURCES, *OF_SPRINGS])
+        known = ", ".join([*OF_STOPS, *SOURCES, *OF_SPRINGS, *OF_SLIDERS])
         raise SystemModelError(f"unknown parameter '{name}'; there are: {known}")
 
 

@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 from nldyn.base.arrays import TINY, Real
 from nldyn.base.errors import SystemModelError, check_types, shown
 from nldyn.system.contact_law import ContactLaw, check_law, power_law
+from nldyn.system.friction import Friction, as_friction
 from nldyn.system.values import check_finite, check_not_negative, check_positive, check_sides
 
 LARGEST_EXPONENT = 4.0
@@ -254,6 +255,13 @@ class Stop:
     pulls : bool
         False: the force of a linear stop with a dashpot is never negative. It lets go where
         k δ + c δ' falls below zero, and presses again where that rises above it within the stop.
+    tangent : str, optional
+        Interface at the same place whose displacement lies along the surface: there friction acts.
+    friction : Friction or float, optional
+        Its law, or a coefficient μ: where the stop is closed, μ times its force acts against the
+        sliding along `tangent`; where that rests, it sticks as long as friction can hold it.
+    tangent_against : str, optional
+        The same interface of what is on the other side; the ground unless given.
 
     Raises
     ------
@@ -276,6 +284,9 @@ class Stop:
     law: ContactLaw | None = None
     dashpot: float = 0.0
     pulls: bool = True
+    tangent: str | None = None
+    friction: Friction | float | None = None
+    tangent_against: str | None = None
     impulsive: ClassVar[bool] = False  # whether velocities jump where it is hit
 
     def __post_init__(self) -> None:
@@ -304,6 +315,22 @@ class Stop:
             )
         check_finite(owner, "gap", self.gap)
         check_sides(owner, self.at, self.against, self.direction)
+        self._check_friction(owner)
+
+    def _check_friction(self, owner: str) -> None:
+        ends = {"tangent": self.tangent, "tangent_against": self.tangent_against}
+        check_types(**{f"{owner}: {name}": (end, str, None) for name, end in ends.items()})
+        if self.friction is None and self.tangent is None and self.tangent_against is None:
+            return
+        if self.friction is None or self.tangent is None:
+            raise SystemModelError(f"{owner}: friction needs both friction and tangent")
+        if self.tangent in (self.at, self.tangent_against):
+            raise SystemModelError(f"{owner}: tangent must be another interface")
+        if self.dashpot and self.pulls:
+            raise SystemModelError(
+                f"{owner}: a dashpot that pulls leaves no force for friction; give pulls = False"
+            )
+        object.__setattr__(self, "friction", as_friction(owner, self.friction))
 
     @property
     def is_linear(self) -> bool:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from nldyn.base.arrays import TINY, Complex, Real
 from nldyn.base.errors import SystemModelError, is_finite, must_be_symmetric, numbers, shown
+from nldyn.system.friction import DryFriction, Friction, Slider
 from nldyn.system.linear import (
     ForcedResponse,
     LinearPart,
@@ -39,7 +40,7 @@ from nldyn.system.stop import Stop
 from nldyn.system.values import SAME_ENTRY, ZERO_ENTRY
 
 AnySpring = Spring | PolynomialSpring
-AnyDamper = Damper | CubicDamper
+AnyDamper = Damper | CubicDamper | DryFriction
 LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
 NEGATIVE = 1e-10  # of a stiffness with a unit diagonal: an eigenvalue that is not rounding
 NOT_HELD = "the structure is free to move in a way that no stop limits, and nothing tells its place"
@@ -160,6 +161,7 @@ class System:
     def __post_init__(self) -> None:
         self._check_shapes()
         self._check_interfaces()
+        self._check_sliders()
         _ = self.linear
 
     @classmethod
@@ -424,11 +426,22 @@ class System:
         """What acts nonlinearly all the time."""
         return bonds_of(self.springs, self.dampers)
 
+    @cached_property
+    def sliders(self) -> tuple[Slider, ...]:
+        """What slides by dry friction: at the stops, then all the time."""
+        at_stops = [
+            Slider(stop.tangent, stop.tangent_against, stop.friction, number)
+            for number, stop in self.elastic_stops.items()
+            if isinstance(stop.friction, Friction) and stop.tangent is not None
+        ]
+        dry = [d for d in self.dampers if isinstance(d, DryFriction)]
+        return (*at_stops, *(Slider(d.at, d.against, d.law, -1, d.normal_force) for d in dry))
+
     @property
     def loses_by_speed(self) -> bool:
         """Whether a force of a stop or bond depends on the speed."""
         lossy = [stop.depends_on_speed for stop in self.stops]
-        return any(lossy + [bond.depends_on_speed for bond in self.bonds])
+        return bool(self.sliders) or any(lossy + [bond.depends_on_speed for bond in self.bonds])
 
     def unit(self, interface: str) -> str:
         """Unit of the displacement of an interface: m, or rad of a rotation."""
@@ -437,9 +450,10 @@ class System:
     def output(self, interface: str) -> int:
         """Number of the displacement of an interface among the outputs of a flow map.
 
-        Before it come the penetrations of the stops and the displacements at the bonds.
+        Before it come the penetrations of the stops and the displacements of sliders and bonds.
         """
-        return len(self.stops) + len(self.bonds) + self.interfaces.index(interface)
+        acting = len(self.stops) + len(self.sliders) + len(self.bonds)
+        return acting + self.interfaces.index(interface)
 
     @property
     def free_modes(self) -> int:
@@ -468,8 +482,8 @@ class System:
 
     @property
     def jumps(self) -> bool:
-        """Whether a force or a velocity jumps where a stop is hit."""
-        return any(stop.jumps for stop in self.stops)
+        """Whether a force or a velocity jumps where a stop is hit, or a slider turns."""
+        return bool(self.sliders) or any(stop.jumps for stop in self.stops)
 
     @cached_property
     def symmetric(self) -> bool:
@@ -484,6 +498,7 @@ class System:
         return (
             odd
             and all(bond.odd for bond in self.bonds)
+            and all(slider.friction.base_speed == 0.0 for slider in self.sliders)
             and all(
                 sum(same == law and np.array_equal(c, vector) for c, same in stops)
                 == sum(same == law and np.array_equal(-c, vector) for c, same in stops)
@@ -736,12 +751,12 @@ class System:
     def with_elements(self, **changed: Unpack[Elements]) -> System:
         """The same structure with elements whose numbers differ, at the same interfaces.
 
-        Of the springs, polynomial ones may. The linear part is shared, which saves most of the
-        work of making a system.
+        Of the springs, polynomial ones may, of the dampers dry friction. The linear part is
+        shared, which saves most of the work of making a system.
         """
         other = copy.copy(self)
-        if changed.keys() - {"stops", "excitation", "springs"}:
-            raise TypeError("with_elements takes stops, excitation and springs")
+        if changed.keys() - {"stops", "excitation", "springs", "dampers"}:
+            raise TypeError("with_elements takes stops, excitation, springs and dampers")
         kept = {"linear", "total_damping", "spring_stiffness", "stiffness"}
         for derived in vars(self).keys() - {own.name for own in fields(self)} - kept:
             del vars(other)[derived]
@@ -754,7 +769,7 @@ class System:
         """Refuse what ties places that a base carries otherwise; the modes must be complete."""
         bases = [source for source in self.excitation if isinstance(source, BaseMotion)]
         loads = {base.at for base in bases}
-        for table in ("stops", "springs", "dampers"):
+        for table in ("stops", "sliders", "springs", "dampers"):
             for number, element in enumerate(getattr(self, table)):
                 if element.against is None:
                     continue
@@ -764,6 +779,21 @@ class System:
                 )
                 if carried_apart(bases, some, other):
                     raise SystemModelError(told_apart(table, number, element.at, element.against))
+
+    def with_slider(self, number: int, name: str, value: float) -> System:
+        """The system with another `coefficient` or `normal_force` of one of its `sliders`."""
+        slider = self.sliders[number]
+        friction = slider.friction.with_coefficient(value) if name == "coefficient" else None
+        if slider.stop >= 0:
+            stops = list(self.stops)
+            stops[slider.stop] = replace(self.elastic_stops[slider.stop], friction=friction)
+            return self.with_elements(stops=tuple(stops))
+        dry = [i for i, damper in enumerate(self.dampers) if isinstance(damper, DryFriction)]
+        place = dry[number - len(self.sliders)]  # they are the last of the sliders
+        change = {"friction": friction} if friction else {name: value}
+        dampers = list(self.dampers)
+        dampers[place] = replace(dampers[place], **change)
+        return self.with_elements(dampers=tuple(dampers))
 
     def _check_shapes(self) -> None:
         n = self.natural_frequencies.size
@@ -786,6 +816,23 @@ class System:
         if both:
             raise SystemModelError(f"'{min(both)}' names both an interface and a load vector")
 
+    def _check_sliders(self) -> None:
+        """Refuse sliders that stick together in every mode: what each holds would not be told."""
+        sliders = self.sliders
+        if not sliders:
+            return
+        always = [s for s in sliders if s.stop < 0 or self.stops[s.stop].gap < 0.0]
+        for one in [None, *(s for s in sliders if s not in always)]:
+            together = always if one is None else [*always, one]
+            rows = [self.vector_between(s.at, s.against) for s in together]
+            if _rank(rows, self.size) < len(rows):
+                names = ", ".join(f"'{s.at}'" for s in together)
+                raise SystemModelError(
+                    f"friction at {names} acts on motions that are not independent in {self.size} "
+                    "modes, so that nothing tells what each holds where they stick: merge them, or "
+                    "keep more modes"
+                )
+
     def _check_interfaces(self) -> None:
         known = ", ".join(self.participation) or "none"
         for turning in self.rotations:
@@ -800,8 +847,8 @@ class System:
             for element in elements:
                 if not isinstance(element, classes):
                     raise SystemModelError(f"{kind} cannot be {shown(element)}")
-                ends = ("at", element.at), ("against", getattr(element, "against", None))
-                for end, name in ends:
+                for end in ("at", "against", "tangent", "tangent_against"):
+                    name = getattr(element, end, None)
                     if name is None:
                         continue
                     if kind == "excitation" and name in self.loads:

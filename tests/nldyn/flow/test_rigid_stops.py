@@ -208,7 +208,7 @@ def test_sensitivities_are_those_of_differences(name):
 
 
 GYROSCOPIC, CIRCULATORY = np.array([[0.0, 0.3], [-0.3, 0.0]]), np.array([[0.0, 0.2], [-0.2, 0.0]])
-BASE = np.array([1.0, 0.6])  # load vector, in kg
+BASE = np.array([1.0, 1.0])  # M r in kg of a base that carries both alike
 
 
 def beside_all_elements():

@@ -1,0 +1,164 @@
+"""Dry friction: Coulomb's law, and what slides by it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from nldyn.base.arrays import Real
+from nldyn.base.errors import SystemModelError, check_types
+from nldyn.system.values import check_ends, check_finite, check_not_negative, check_positive
+
+
+@dataclass(frozen=True)
+class Friction:
+    r"""Coefficient of Coulomb's friction, which may fall with the speed of sliding.
+
+    :math:`\mu(v) = \mu + (\mu_0 - \mu)\,e^{-|v|/v_0}`, with v the speed beside that of what it
+    slides on. At rest friction is what it must be to stay, up to :math:`\mu_0` times the normal
+    force.
+
+    Parameters
+    ----------
+    coefficient : float
+        μ of fast sliding.
+    at_rest : float, optional
+        μ₀, at least μ; the same unless given.
+    fading_speed : float, optional
+        v₀ in m/s; needed where `at_rest` is larger.
+    base_speed : float
+        Speed in m/s at which what it slides on moves along: a belt, the surface of a rotor.
+
+    Raises
+    ------
+    SystemModelError
+        For a value out of range, or a larger coefficient at rest without a fading speed.
+
+    References
+    ----------
+    R. Stribeck (1902), *Z. VDI* 46; B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit (1994),
+    *Automatica* 30, 1083-1138, for the law.
+
+    Examples
+    --------
+    >>> falling = Friction(0.2, at_rest=0.3, fading_speed=0.1)
+    >>> falling.at([0.0, 1e9]).tolist()
+    [0.3, 0.2]
+    """
+
+    coefficient: float
+    at_rest: float | None = None
+    fading_speed: float | None = None
+    base_speed: float = 0.0
+
+    def __post_init__(self) -> None:
+        owner = "friction"
+        check_not_negative(owner, "coefficient", self.coefficient)
+        check_finite(owner, "base_speed", self.base_speed)
+        if self.at_rest is not None:
+            check_finite(owner, "at_rest", self.at_rest)
+            if self.at_rest < self.coefficient:
+                raise SystemModelError(
+                    f"friction: at_rest must be at least the coefficient, {self.coefficient:g}, "
+                    f"got {self.at_rest:g}"
+                )
+        if self.fading_speed is not None:
+            check_positive(owner, "fading_speed", self.fading_speed)
+        if self.adhesion > 0.0 and self.fading_speed is None:
+            raise SystemModelError(
+                "friction: at_rest above the coefficient needs a fading_speed, in which it falls"
+            )
+
+    def with_coefficient(self, coefficient: float) -> Friction:
+        """The same with another coefficient, at rest by as much another one."""
+        at_rest = None if self.at_rest is None else coefficient + self.adhesion
+        return replace(self, coefficient=coefficient, at_rest=at_rest)
+
+    @property
+    def adhesion(self) -> float:
+        """By how much the coefficient at rest is larger."""
+        return 0.0 if self.at_rest is None else self.at_rest - self.coefficient
+
+    def at(self, speed: ArrayLike) -> Real:
+        """Coefficient at speeds of sliding in m/s, of either sign."""
+        slow = np.zeros(np.shape(speed))
+        if self.fading_speed is not None:
+            slow = np.exp(-np.abs(speed) / self.fading_speed)
+        return np.asarray(self.coefficient + self.adhesion * slow)
+
+
+def as_friction(owner: str, given: Friction | float) -> Friction:
+    """A law of friction, of a coefficient alone if it is a number."""
+    check_types(**{f"{owner}: friction": (given, Friction, float, int)})
+    return given if isinstance(given, Friction) else Friction(given)
+
+
+@dataclass(frozen=True)
+class DryFriction:
+    r"""Dry friction that acts all the time: :math:`F = \mu(v)\,N\,\mathrm{sign}\,v`, exactly.
+
+    Where the speed is zero it sticks, without giving way, as long as that takes no more than
+    :math:`\mu_0 N`. Given among the `dampers` of a `System`.
+
+    Parameters
+    ----------
+    at : str
+        Interface that slides.
+    normal_force : float
+        N, that presses it on, in N.
+    friction : Friction or float
+        The law, or a coefficient μ.
+    against : str, optional
+        Interface that it slides on; the ground unless given.
+
+    Raises
+    ------
+    SystemModelError
+        For a value out of range, or one interface at both ends.
+
+    Examples
+    --------
+    >>> DryFriction("block", 10.0, 0.3).friction.coefficient
+    0.3
+    """
+
+    at: str
+    normal_force: float
+    friction: Friction | float
+    against: str | None = None
+
+    def __post_init__(self) -> None:
+        check_ends("dry friction", self.at, self.against)
+        owner = f"dry friction at '{self.at}'"
+        check_positive(owner, "normal_force", self.normal_force)
+        object.__setattr__(self, "friction", as_friction(owner, self.friction))
+
+
+    @property
+    def law(self) -> Friction:
+        """The law of friction."""
+        return as_friction(self.at, self.friction)
+
+
+@dataclass(frozen=True)
+class Slider:
+    """What slides in a system: where, by which law, and what presses it on.
+
+    Parameters
+    ----------
+    at, against : str
+        As for `DryFriction`.
+    friction : Friction
+    stop : int
+        Number of the stop whose force presses it on, or -1.
+    normal_force : float
+        Force in N that does so in place of a stop's.
+    """
+
+    at: str
+    against: str | None
+    friction: Friction
+    stop: int = -1
+    normal_force: float = 0.0

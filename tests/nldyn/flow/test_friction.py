@@ -1,0 +1,218 @@
+"""Dry friction against closed forms, differences and an independent integration."""
+
+import math
+
+import numpy as np
+import pytest
+from sliding import Body, Contact
+
+from nldyn import (
+    FlowMap,
+    HarmonicForce,
+    Parameter,
+    Stop,
+    System,
+    SystemModelError,
+    continue_branch,
+    load,
+    save,
+    solve_orbit,
+)
+from nldyn.system import DryFriction, Friction
+from nldyn.system.chart import value_of, with_value
+
+
+def block(share, *, damping=0.0, force=1.0, **law):
+    """Mass 1 on a spring 1, pressed on by 1 N."""
+    return System.from_matrices(
+        [[1.0]],
+        [[1.0]],
+        {"x": [1.0]},
+        damping=[[damping]],
+        dampers=[DryFriction("x", 1.0, Friction(share, **law))],
+        excitation=[HarmonicForce("x", force)] if force else [],
+    )
+
+
+def to_state(system, y):
+    """State z of displacements and speeds (2n,) of all interfaces."""
+    n = system.size
+    rows = np.array([system.participation[name] for name in system.interfaces])
+    modal = np.concatenate([np.linalg.solve(rows, y[:n]), np.linalg.solve(rows, y[n:])])
+    return system.linear.left @ modal
+
+
+def from_state(system, z):
+    n = system.size
+    rows = np.array([system.participation[name] for name in system.interfaces])
+    modal = system.linear.right @ z
+    return np.concatenate([rows @ modal[:n], rows @ modal[n:]])
+
+
+@pytest.mark.parametrize(
+    ("swings", "where"), [(1, -0.8), (2, 0.6), (3, -0.4), (4, 0.2), (5, 0.0), (9, 0.0)]
+)
+def test_a_block_loses_twice_its_friction_in_each_half_swing_and_sticks(swings, where):
+    system = block(0.1, force=0.0)
+    found = FlowMap(system).shoot(
+        to_state(system, np.array([1.0, 0.0]))[None], np.array([0.0, swings * math.pi]), 1.0
+    )
+    assert found.failure == ""
+    np.testing.assert_allclose(from_state(system, found.ends[0]), [where, 0.0], atol=1e-14)
+
+
+@pytest.mark.parametrize("ratio", [0.6, 0.8, 1.25, 1.5])
+@pytest.mark.parametrize("share", [0.1, 0.4])
+def test_den_hartogs_amplitude_of_motion_without_stops(ratio, share):
+    """J. P. Den Hartog (1931), Trans. ASME 53, for Coulomb's friction alone."""
+    swing = math.sin(math.pi / ratio) / (ratio * (1.0 + math.cos(math.pi / ratio)))
+    amplitude = math.sqrt(1.0 / (1.0 - ratio**2) ** 2 - (swing * share) ** 2)
+    orbit = solve_orbit(block(share), ratio / (2.0 * math.pi))
+    assert orbit.max_abs_displacement == pytest.approx(amplitude, rel=1e-9)
+    # the excitation gives what friction takes: 4 F X
+    phases = np.linspace(0.0, 2.0 * math.pi, 4001)
+    states = orbit.states(phases)
+    rate = states @ orbit.trajectory.flow.rate_rows[0]
+    work = np.trapezoid(np.cos(phases) * rate, phases) / ratio
+    assert work == pytest.approx(4.0 * share * amplitude, rel=1e-5)  # of the trapezoids
+
+
+def drawn(seed):
+    """A random structure with friction at stops and all the time, the same for both ways."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 4))
+    A = rng.normal(size=(n, n))
+    M, K = np.diag(rng.uniform(0.5, 2.0, n)), A @ A.T + np.eye(n)
+    C, names, unit = 0.05 * K + 0.02 * M, [f"x{i}" for i in range(n)], np.eye(n)
+    omega, forces, phases = rng.uniform(0.5, 2.0), 3.0 * rng.random(n), rng.uniform(0.0, 360.0, n)
+    contacts, stops, dry = [], [], []
+    for b in rng.permutation(n)[: int(rng.integers(1, n + 1))]:
+        law = Friction(float(rng.uniform(0.05, 0.8)), base_speed=float(rng.choice([0.0, 0.3])))
+        if rng.random() < 0.4:
+            law = Friction(law.coefficient, 1.5 * law.coefficient, 0.2, law.base_speed)
+        if rng.random() < 0.5:
+            force = float(rng.uniform(0.3, 2.0))
+            contacts.append(Contact(unit[b], law, force))
+            dry.append(DryFriction(names[b], force, law))
+            continue
+        a = int(rng.choice([i for i in range(n) if i != b]))
+        sign, p = int(rng.choice([1, -1])), float(rng.choice([1.0, 1.5]))
+        k, gap = float(rng.uniform(20.0, 200.0)), float(rng.uniform(-0.1, 0.8))
+        contacts.append(Contact(unit[b], law, 0.0, sign * unit[a], k, p, gap))
+        stops.append(Stop(names[a], k, p, gap, sign, friction=law, tangent=names[b]))
+    turn = np.radians(phases)
+    body = Body(M, C, K, lambda t: forces * np.cos(omega * t + turn), contacts)
+    system = System.from_matrices(
+        M, K, dict(zip(names, unit, strict=True)), damping=C, stops=stops, dampers=dry,
+        excitation=[HarmonicForce(*row) for row in zip(names, forces, phases, strict=True)],
+    )  # fmt: skip
+    return system, body, omega, 0.7 * rng.normal(size=2 * n), float(rng.uniform(1.0, 3.0))
+
+
+def agrees(seed):
+    system, body, omega, start, turns = drawn(seed)
+    phases = np.array([0.0, 2.0 * math.pi * turns])
+    expected, _ = body.followed(start, phases[1] / omega, 0.2 / omega)
+    flow, z = FlowMap(system), to_state(system, start)[None]
+    found = flow.shoot(z, phases, omega)
+    assert found.failure == ""
+    size = np.abs(expected).max()
+    np.testing.assert_allclose(from_state(system, found.ends[0]), expected, atol=1e-8 * size)
+    step = 1e-5  # states are good to 1e-10
+    moved = [
+        [flow.shoot(z + way * step * row, phases, omega).ends[0] for way in (1.0, -1.0)]
+        for row in np.eye(z.size)
+    ]
+    by = np.array([(up - down) / (2.0 * step) for up, down in moved]).T
+    np.testing.assert_allclose(found.jacobians[0], by, atol=3e-5 * max(np.abs(by).max(), 1.0))
+    up, down = (flow.shoot(z, phases, omega * (1.0 + way * step)).ends[0] for way in (1.0, -1.0))
+    np.testing.assert_allclose(found.d_omega[0], (up - down) / (2.0 * step * omega), atol=3e-5)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_random_systems_agree_with_integration_from_event_to_event(seed):
+    agrees(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(20, 320))
+def test_more_random_systems_agree(seed):
+    agrees(seed)
+
+
+@pytest.mark.parametrize(("name", "index"), [("friction", 0), ("friction", 1), ("normal_force", 1)])
+def test_derivatives_by_the_numbers_of_sliders_are_those_of_differences(name, index):
+    system = System.from_matrices(
+        np.diag([1.0, 2.0]),
+        [[3.0, -1.0], [-1.0, 2.0]],
+        {"x": [1.0, 0.0], "y": [0.0, 1.0]},
+        modal_damping=0.02,
+        stops=[Stop("x", 50.0, 1.5, 0.1, friction=Friction(0.3, 0.5, 0.2), tangent="y")],
+        dampers=[DryFriction("x", 0.3, 0.4)],
+        excitation=[HarmonicForce("x", 2.0), HarmonicForce("y", 1.0)],
+    )
+    parameter, step = Parameter(name, index), 1e-6
+    z, phases = to_state(system, np.array([0.3, 0.5, 0.2, -0.4]))[None], np.array([0.0, 9.0])
+    found = FlowMap(system).shoot(z, phases, 1.1, parameters=[parameter])
+    value = value_of(system, 1.0, parameter)
+    up, down = (
+        FlowMap(with_value(system, parameter, value + way * step)).shoot(z, phases, 1.1).ends[0]
+        for way in (1.0, -1.0)
+    )
+    np.testing.assert_allclose(found.d_parameters[0, :, 0], (up - down) / (2.0 * step), atol=1e-7)
+
+
+def test_a_branch_goes_on_where_a_block_begins_to_stick_and_is_saved(tmp_path):
+    """Den Hartog's motion gets stops: the branch has a corner there, and is passed."""
+    branch = continue_branch(solve_orbit(block(0.4, damping=0.05), 0.13), (0.05, 0.25))
+    assert branch.stop_reason == "end of the frequency range / end of the frequency range"
+    save(branch, tmp_path / "branch.h5")
+    (again,) = load(tmp_path / "branch.h5")
+    first = branch.points[0]
+    assert again.points[0].system.sliders == first.system.sliders
+    for orbit in branch.points[:: max(len(branch.points) // 7, 1)]:
+        alone = solve_orbit(orbit.system, orbit.frequency_hz)
+        assert orbit.max_abs_displacement == pytest.approx(
+            alone.max_abs_displacement, rel=1e-8
+        )
+
+
+def test_friction_of_zero_changes_nothing():
+    plain = System.from_matrices(
+        np.eye(2), [[2.0, -1.0], [-1.0, 2.0]], {"x": [1.0, 0.0], "y": [0.0, 1.0]},
+        modal_damping=0.05, stops=[Stop("x", 100.0, gap=0.2)], excitation=[HarmonicForce("x", 1.0)],
+    )  # fmt: skip
+    smooth = plain.with_elements(stops=(Stop("x", 100.0, gap=0.2, friction=0.0, tangent="y"),))
+    orbits = [solve_orbit(system, 0.15) for system in (plain, smooth)]
+    sizes = [orbit.max_abs_displacement for orbit in orbits]
+    assert orbits[0].impacts > 0
+    assert sizes[0] == pytest.approx(sizes[1], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (lambda: Friction(-0.1), "coefficient must not be negative"),
+        (lambda: Friction(0.2, 0.1, 1.0), "at_rest must be at least"),
+        (lambda: Friction(0.2, 0.3), "needs a fading_speed"),
+        (lambda: DryFriction("x", 0.0, 0.2), "normal_force must be positive"),
+        (lambda: DryFriction("x", 1.0, 0.2, "x"), "against must be another"),
+        (lambda: Stop("x", 1.0, friction=0.2), "needs both friction and tangent"),
+        (lambda: Stop("x", 1.0, friction=0.2, tangent="x"), "tangent must be another"),
+        (
+            lambda: Stop("x", 1.0, 1.0, dashpot=0.1, tangent="y", friction=0.2),
+            "a dashpot that pulls",
+        ),
+    ],
+)
+def test_bad_numbers_are_refused_in_a_sentence(make, told):
+    with pytest.raises(SystemModelError, match=told):
+        make()
+
+
+def test_what_one_mode_cannot_tell_apart_is_refused():
+    with pytest.raises(SystemModelError, match="not independent in 1 modes"):
+        System.from_modal(
+            [1.0], {"x": [1.0], "y": [2.0]},
+            dampers=[DryFriction("x", 1.0, 0.1), DryFriction("y", 1.0, 0.1)],
+        )  # fmt: skip

@@ -1,0 +1,87 @@
+"""``[[friction]]`` of a scene."""
+
+import pytest
+
+from nldyn.base.errors import SceneError
+from nldyn.scene.build import build_system
+from nldyn.scene.followed import followed_parameter
+from nldyn.scene.read import load_scene
+from nldyn.system import DryFriction, Friction
+from nldyn.system.chart import value_of
+
+SCENE = """
+[matrices]
+mass = [[1.0, 0.0], [0.0, 1.0]]
+stiffness = [[1.0, 0.0], [0.0, 4.0]]
+[matrices.interfaces]
+across = [1.0, 0.0]
+along = [0.0, 1.0]
+[[stops]]
+at = "across"
+stiffness = 50.0
+[[stops]]
+at = "across"
+law = "rigid"
+restitution = 0.5
+gap = 2.0
+[[friction]]
+at = "across"
+coefficient = 0.1
+normal_force = 3.0
+{other}
+[[excitation]]
+at = "across"
+kind = "harmonic"
+amplitude = 1.0
+[continuation]
+frequency_hz = 0.2
+parameter = "friction.1.coefficient"
+range = [0.1, 0.4]
+"""
+AT_STOP = """
+[[friction]]
+at = "along"
+coefficient = 0.3
+at_rest = 0.4
+fading_speed = 0.1
+base_speed = 0.2
+stop = 0
+"""
+
+
+def scene_with(tmp_path, other):
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.format(other=other))
+    return load_scene(path)
+
+
+def test_tables_become_friction_of_stops_and_dampers_and_their_coefficients_may_change(tmp_path):
+    scene = scene_with(tmp_path, AT_STOP)
+    system = build_system(scene)
+    assert system.stops[0].friction == Friction(0.3, 0.4, 0.1, 0.2)
+    assert system.stops[0].tangent == "along"
+    assert system.dampers == (DryFriction("across", 3.0, 0.1),)
+    # that of the stop comes first among the sliders, though it is the second table
+    assert value_of(system, 0.2, followed_parameter(scene)) == 0.3
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"stop = 0": ""}, "needs one of 'normal_force' and 'stop'"),
+        ({"stop = 0": "stop = 0\nnormal_force = 1.0"}, "has both 'normal_force' and 'stop'"),
+        ({"stop = 0": "stop = 1"}, "is rigid"),
+        ({"stop = 0": "stop = 2"}, "no stop has that number; there are 2"),
+        ({"fading_speed = 0.1": ""}, "needs a 'fading_speed'"),
+        ({"at_rest = 0.4": "at_rest = 0.2"}, "'at_rest' of at least"),
+        ({"0.3": "-0.3"}, "coefficient"),
+        ({'"along"': '"alongside"'}, "alongside"),
+    ],
+)
+def test_bad_friction_is_refused_with_its_place(tmp_path, change, told):
+    text = AT_STOP
+    for old, new in change.items():
+        text = text.replace(old, new)
+    with pytest.raises(SceneError, match="friction") as error:
+        build_system(scene_with(tmp_path, text))
+    assert told in str(error.value)
