@@ -1,8 +1,9 @@
 """A block that slides on dry friction.
 
 Pulled to and fro with $P\\cos\\omega t$ against a spring k and a friction force F, a block that
-does not stop within its swing has the amplitude of J. P. Den Hartog (1931),
-$(kX/P)^2 = (1 - \\beta^2)^{-2} - (F/P)^2 (\\tan(\\pi/2\\beta)/\\beta)^2$ with $\\beta = \\omega/\\omega_0$.
+does not stop within its swing has the amplitude of J. P. Den Hartog (1931); β is the frequency over
+its own:
+$(kX/P)^2 = (1 - \\beta^2)^{-2} - (F/P)^2 (\\tan(\\pi/2\\beta)/\\beta)^2$.
 """
 
 import math
