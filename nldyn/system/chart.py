@@ -148,7 +148,8 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     parameter : str or Parameter
         An `OwnParameter`, or frequency_hz; gap, stiffness, exponent, dissipation, dashpot or
         restitution of a stop; amplitude, mass_times_radius or force of an excitation; friction or
-        normal_force of a slider; coefficient of a damper; spring_stiffness of a linear spring; k1, k2, ... of a polynomial one;
+        normal_force of a slider; coefficient of a damper; spring_stiffness of a linear spring; k1,
+        k2, ... of a polynomial one;
         modal_damping (ratio) or natural_frequency_hz of a mode; spin_hz of a system with a `Spin`,
         or speed_hz, which is spin and frequency in one where they are equal. The index -1 of
         modal_damping means all modes, which then have one ratio.
