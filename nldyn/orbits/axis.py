@@ -37,7 +37,8 @@ def chart_over(
     system: System, limits: tuple[float, float], parameter: str | Parameter | None = None
 ) -> Chart:
     """The chart of a parameter of a system over a range, checked; of the frequency for None."""
-    return Chart.of(checked_parameter(system, parameter or FREQUENCY), limits)
+    chosen = checked_parameter(system, FREQUENCY if parameter is None else parameter)
+    return Chart.of(chosen, limits)
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class Axis:
             If there is no such parameter, it cannot have these values, or the frequency is given
             where it changes or missing where it does not.
         """
-        chosen = checked_parameter(system, parameter or FREQUENCY)
+        chosen = checked_parameter(system, FREQUENCY if parameter is None else parameter)
         name = parameter_name(chosen)
         if moves_frequency(chosen):
             if frequency_hz is not None:
