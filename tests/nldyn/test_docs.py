@@ -120,7 +120,7 @@ def test_example_of_the_readme_prints_what_it_says(capsys):
 
 def test_example_of_the_branches_prints_what_it_says(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, over_gap = re.findall(r"```python\n(.*?)```", BRANCHES, flags=re.S)
+    code, over_gap, events = re.findall(r"```python\n(.*?)```", BRANCHES, flags=re.S)
     exec(code, {})
     (said,) = re.findall(r"It prints\n\n```\n(.*?)```", BRANCHES, flags=re.S)
     assert capsys.readouterr().out == said
@@ -133,6 +133,10 @@ def test_example_of_the_branches_prints_what_it_says(capsys, tmp_path, monkeypat
     exec(over_gap, {})
     (said,) = re.findall(r"^It prints `(.*?)`", BRANCHES, flags=re.M)
     assert capsys.readouterr().out == f"{said}\n"
+    exec(events, {})
+    first, last = re.findall(r"# (10 µm \S+), ..., (.*)", events)[0]
+    *rows, end = capsys.readouterr().out.splitlines()
+    assert (rows[0], end) == (first, last)
 
 
 def test_every_column_of_a_table_is_documented():
