@@ -143,6 +143,12 @@ typedef struct {
     Complex rate; /* eigenvalue λ of a growth, trace + i determinant of a drift */
 } Term;
 
+/* sine and cosine of a phase */
+typedef struct {
+    double phase;
+    Complex turn;
+} Turn;
+
 /* A system at one excitation frequency. */
 typedef struct {
     int n, size, n_out, n_stops, n_columns, n_parameters, n_terms;
@@ -158,6 +164,7 @@ typedef struct {
     Complex *forced;           /* (1 + k, 2 + n_parameters, n_out) the same of the outputs */
     const int64_t *parameters; /* (n_parameters, 2) column of `stops`, or -1; index of the stop */
     double omega, tail, node_angle;
+    Turn *turns; /* (2,) of the last phases that outputs were asked for at: mostly the same again */
     Watch *watch;
 } Flow;
 
@@ -179,6 +186,7 @@ typedef struct {
     double *inverse;  /* (na m, na m) of 1 - slope G, at these slopes or earlier ones, see `invert` */
     int *order;       /* (na m,) scratch for it */
     bool kept;        /* whether it is worth keeping */
+    double *inverted; /* (outputs, m) slopes for which it was filled, or nan in the first */
     int made_kind;    /* kind and length for which there, to, back and G were filled */
     double made_length;
     double *rise;     /* (na, 2n, m) row (exp(A t_i) - 1) of the penetrations */

@@ -101,11 +101,22 @@ static void add_growth(const Flow *fl, double phase, double sign, double *w, dou
     }
 }
 
+/* `turned` of a phase, which is often one of the last two */
+static Complex turn_at(const Flow *fl, double phase)
+{
+    Turn *last = fl->turns;
+    if (phase == last[0].phase) return last[0].turn;
+    Turn other = last[1];
+    last[1] = last[0];
+    last[0] = phase == other.phase ? other : (Turn){phase, turned(phase)};
+    return last[0].turn;
+}
+
 /* value and first two time derivatives of an output at present */
 static Course output_now(const Flow *fl, int out, const double *w, double phase)
 {
     double omega = fl->omega;
-    Complex turn = product(forced_of(fl, 0, 0, out), turned(phase));
+    Complex turn = product(forced_of(fl, 0, 0, out), turn_at(fl, phase));
     Course found = {turn.re, -omega * turn.im, -omega * omega * turn.re, 0.0};
     const double *row0 = row_of(fl, 0, out), *row1 = row_of(fl, 1, out), *row2 = row_of(fl, 2, out);
     for (int k = 0; k < fl->size; k += 2) {
@@ -129,7 +140,7 @@ static Course output_after(const Flow *fl, int out, const double *w, double phas
     double omega = fl->omega;
     Complex turn = product(forced_of(fl, 0, 0, out), turned(phase + omega * t));
     Course found = {turn.re, -omega * turn.im, -omega * omega * turn.re,
-                    modulus(turn) * cubed(omega)};
+                    length_of(turn.re, turn.im) * cubed(omega)};
     const double *row0 = row_of(fl, 0, out), *row1 = row_of(fl, 1, out), *row2 = row_of(fl, 2, out);
     const double *bound3 = fl->bound3 + (size_t)out * fl->size;
     for (int b = 0; b < fl->n; b++) {
@@ -148,7 +159,7 @@ static Course output_after(const Flow *fl, int out, const double *w, double phas
         if (block[1] == 0.0 && block[2] == 0.0) /* two decays */
             found.bound += bound3[j] * fabs(x) + bound3[j + 1] * fabs(y);
         else
-            found.bound += hypot(bound3[j], bound3[j + 1]) * hypot(x, y);
+            found.bound += length_of(bound3[j], bound3[j + 1]) * length_of(x, y);
     }
     if (fl->n_terms > 0) {
         Course more = swelling(fl, out, phase + omega * t);
@@ -166,15 +177,22 @@ static double distance(const Flow *fl, int stop, const double *w, double phase)
     return output_now(fl, stop, w, phase).value - stop_of(fl, stop)->gap;
 }
 
+/* size of a term of the response in an output */
+static double forced_size(const Flow *fl, int term, int out)
+{
+    Complex share = forced_of(fl, term, 0, out);
+    return length_of(share.re, share.im);
+}
+
 /* sum of the sizes of an output's terms (order 0), or those of its rate or acceleration */
 static double output_size(const Flow *fl, int out, const double *w, int order)
 {
     double omega = fl->omega, pace = order == 0 ? 1.0 : order == 1 ? omega : omega * omega;
-    double total = modulus(forced_of(fl, 0, 0, out)) * pace;
+    double total = forced_size(fl, 0, out) * pace;
     for (int k = 0; k < fl->n_terms; k++) {
         Value sizes = term_sizes(fl->terms + k, omega);
         double share = order == 0 ? sizes.value : sizes.slope * (order == 1 ? 1.0 : omega);
-        total += modulus(forced_of(fl, 1 + k, 0, out)) * share;
+        total += forced_size(fl, 1 + k, out) * share;
     }
     const double *row = row_of(fl, order, out);
     for (int j = 0; j < fl->size; j++) total += fabs(row[j] * w[j]);
@@ -196,9 +214,9 @@ static double rate_noise(const Flow *fl, int out, const double *w)
 /* the same in a penetration that is carried on from a depth over a time h */
 static double carried_noise(const Flow *fl, int stop, const double *w, double depth, double h)
 {
-    double change = modulus(forced_of(fl, 0, 0, stop)) * fl->omega * h;
+    double change = forced_size(fl, 0, stop) * fl->omega * h;
     for (int k = 0; k < fl->n_terms; k++)
-        change += h * modulus(forced_of(fl, 1 + k, 0, stop)) *
+        change += h * forced_size(fl, 1 + k, stop) *
                   term_sizes(fl->terms + k, fl->omega).slope;
     const double *row1 = row_of(fl, 1, stop), *row2 = row_of(fl, 2, stop);
     for (int j = 0; j < fl->size; j++)
@@ -228,7 +246,7 @@ static double fastest_moved(const System *sys)
 /* change of a penetration in a flight of duration t from the state w, to its own precision */
 static double flown(const Flow *fl, int stop, double phase, const double *w, double t)
 {
-    double value = product(forced_of(fl, 0, 0, stop), swung(turned(phase), fl->omega * t)).re;
+    double value = product(forced_of(fl, 0, 0, stop), swung(turn_at(fl, phase), fl->omega * t)).re;
     if (fl->n_terms > 0) value += swollen(fl, stop, phase, t);
     const double *row = row_of(fl, 0, stop);
     for (int b = 0; b < fl->n; b++) {

@@ -28,6 +28,7 @@ static void renew_panel(const Flow *fl, Panel *panel, const int *active, int na)
     for (int a = 0; a < na; a++) panel->decayed[a] = panel->decay[a] = 0.0;
     panel->kept = false;
     panel->made_kind = -1;
+    panel->inverted[0] = NAN;
     panel->made_length = 0.0;
 }
 
@@ -110,6 +111,7 @@ static void panel_responses(const Flow *fl, const Gauss *tab, int kind, double h
     if (panel->made_kind == kind && panel->made_length == h) return;
     panel->made_kind = kind;
     panel->made_length = h;
+    panel->inverted[0] = NAN;
     double *back = s->waves + 4 * m, *less = back + 4 * m;
     for (int i = 0; i < m; i++) s->times[i] = h * tab->chi[kind * m + i];
     for (int b = 0; b < fl->n; b++) {
@@ -122,12 +124,12 @@ static void panel_responses(const Flow *fl, const Gauss *tab, int kind, double h
 
 /* fill how a complex number of length one has turned, from a phase on, at the nodes of a panel, to
  * its own precision: real and imaginary parts (2, m); angles (m,) is scratch */
-static void fill_turns(const Gauss *tab, int kind, double phase, double angle, double *angles,
-                       double *restrict turns)
+static void fill_turns(const Flow *fl, const Gauss *tab, int kind, double phase, double angle,
+                       double *angles, double *restrict turns)
 {
     int m = (int)tab->m;
     const double *chi = tab->chi + (size_t)kind * m;
-    Complex start = turned(phase);
+    Complex start = turn_at(fl, phase);
     double *restrict sine = turns, *restrict cosine = turns + m;
     for (int i = 0; i < m; i++) angles[i] = 0.5 * angle * chi[i];
     if (angle < LARGEST_ANGLE)
@@ -153,7 +155,7 @@ static void free_output_at_nodes(const Flow *fl, double phase, const double *w, 
     int na = panel->na, m = panel->m, size = fl->size, stop = panel->active[o % na];
     int order = output_order(fl, stop, o / na);
     double omega = fl->omega;
-    Complex steady = forced_of(fl, 0, 0, stop), start = turned(phase);
+    Complex steady = forced_of(fl, 0, 0, stop), start = turn_at(fl, phase);
     const double *rows = (order == 0 ? panel->rise : panel->to) + (size_t)o * size * m;
     for (int i = 0; i < m; i++) {
         Complex swing = complex_of(turns[i], turns[m + i]), turn = sum(start, swing);
@@ -182,7 +184,7 @@ static void free_outputs(const Flow *fl, const Gauss *tab, int kind, double phas
                          double h, const Panel *panel, Scratch *s)
 {
     int m = panel->m;
-    fill_turns(tab, kind, phase, fl->omega * h, s->times, s->waves);
+    fill_turns(fl, tab, kind, phase, fl->omega * h, s->times, s->waves);
     for (int o = 0; o < panel->outputs; o++)
         free_output_at_nodes(fl, phase, w, h, panel, o, tab->chi + (size_t)kind * m, s->waves,
                              s->step, s->free + (size_t)o * m);
@@ -247,11 +249,16 @@ static void panel_forces(const Flow *fl, Panel *panel, double *slope)
     }
 }
 
-/* fill the inverse of the matrix 1 - slope G */
+/* fill the inverse of the matrix 1 - slope G, unless it is there: slopes of linear laws stay; what
+ * depends on speeds may depend on more */
 static void invert_panel(const Flow *fl, Panel *panel)
 {
     int width = panel->na * panel->m, height = panel->outputs * panel->m, pad = padded(width);
     const double *slope = panel->slope, *rates = slope + width;
+    bool same = height == width;
+    for (int p = 0; p < height && same; p++) same = slope[p] == panel->inverted[p];
+    if (same) return;
+    memcpy(panel->inverted, slope, sizeof(double) * height);
     for (int q = 0; q < width; q++) {
         double *restrict column = panel->inverse + (size_t)q * pad;
         const double *G = panel->G + (size_t)q * height;

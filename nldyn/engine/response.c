@@ -170,6 +170,7 @@ static void fill_forced(Flow *fl)
 static void at_frequency(const System *sys, double omega, const Complex *drive_by, Flow *fl)
 {
     fl->omega = omega;
+    fl->turns[0].phase = fl->turns[1].phase = NAN;
     fl->n_terms = further_terms(sys, omega, fl->terms);
     int rows = 2 + fl->n_parameters;
     memset(fl->response, 0, sizeof(Complex) * (1 + fl->n_terms) * rows * fl->size);

@@ -44,6 +44,7 @@ static void lay_out_flow(Block *block, const System *sys, int n_parameters,
     fl->tail = sys->tail;
     fl->node_angle = sys->node_angle;
     size_t amplitudes = (1 + most_terms(sys)) * (2 + (size_t)n_parameters);
+    fl->turns = room(block, 2, sizeof(Turn));
     fl->pushes = numbers(block, (size_t)fl->n_stops * fl->size);
     fl->slides = indices(block, fl->n_stops);
     fl->terms = room(block, most_terms(sys), sizeof(Term));
@@ -59,6 +60,7 @@ static void lay_out_panel(Block *block, const Flow *fl, int m, Panel *panel)
     panel->output = numbers(block, outputs);
     panel->F = numbers(block, nodes);
     panel->slope = numbers(block, outputs);
+    panel->inverted = numbers(block, outputs);
     panel->there = numbers(block, 2 * size * m);
     panel->to = numbers(block, outputs * size);
     panel->back = numbers(block, nodes * size);
