@@ -2,17 +2,19 @@
 # models (hours; it goes on where it was interrupted), `make test` runs the tests, `make bench` measures
 # speed against error, `make hard` computes the hard cases, `make faults` tries thousands of bad
 # inputs and hundreds of kills, `make docs` builds the site of the documentation, `make slow` runs all
-# tests that are too long for `make test`, `make sanitize` looks for faults of memory in the engine.
+# tests that are too long for `make test`, `make sanitize` looks for faults of memory in the engine,
+# `make wheels` builds what a release uploads, for all platforms, and `make installed` tests it here.
 # All set up a virtual environment in .venv first.
 PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: paper atlas test slow check bench hard faults sanitize docs clean
+.PHONY: paper atlas test slow check bench hard faults sanitize wheels installed docs clean
 
 $(VENV)/.installed: pyproject.toml compile_engine.py $(wildcard nldyn/engine/*.[ch])
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[dev]"
+	@$(BIN)/python -c "from nldyn.engine.library import built_by; print('engine:', built_by())"
 	touch $@
 
 paper: $(VENV)/.installed
@@ -54,6 +56,18 @@ sanitize: $(VENV)/.installed
 		-fsanitize=address,undefined -fno-sanitize-recover=undefined
 	$(SANITIZED) tests/random_systems.py 10000
 	$(SANITIZED) -m pytest tests/nldyn/flow tests/nldyn/orbits tests/nldyn/longterm
+
+# from the source archive, so that this holds all they need
+wheels: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[release]"
+	rm -rf dist
+	$(BIN)/python -m build --sdist --outdir dist
+	for platform in $$($(BIN)/python -c "import compile_engine; print(*compile_engine.TARGETS)"); do \
+		NLDYN_PLATFORM=$$platform $(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation \
+			--wheel-dir dist dist/*.tar.gz || exit 1; done
+	$(BIN)/python -m twine check --strict dist/*
+	$(BIN)/check-wheel-contents dist/*.whl
+	$(BIN)/python tests/wheels.py dist
 
 # a broken link or a public name without a docstring ends the build
 docs: $(VENV)/.installed

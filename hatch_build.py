@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import sysconfig
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from compile_engine import compile_engine, compiler
+from compile_engine import compile_engine, compiler, platform_tag
 
 
 class EngineHook(BuildHookInterface):  # type: ignore[misc, type-arg]
@@ -24,8 +23,7 @@ class EngineHook(BuildHookInterface):  # type: ignore[misc, type-arg]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile before the files are gathered; one wheel serves all versions of Python."""
-        platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
-        build_data["tag"] = f"py3-none-{platform}"
+        build_data["tag"] = f"py3-none-{platform_tag()}"
         build_data["pure_python"] = False
         if version == "editable":
             compile_engine()

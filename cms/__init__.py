@@ -10,6 +10,8 @@ from cms.reduction.coupling import Joint, couple
 from cms.reduction.model import ReducedModel
 from cms.reduction.reduction import METHODS, keep_modes, reduce
 
+__version__ = "1.0.0"
+
 __all__ = [
     "METHODS",
     "Accuracy",

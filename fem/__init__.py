@@ -42,6 +42,8 @@ from fem.model.sections import (
 from fem.model.structure import StructureModel, symmetry
 from fem.model.supports import Foundation, Hinge, Interface
 
+__version__ = "1.0.0"
+
 __all__ = [
     "Attachments",
     "BeamPart",

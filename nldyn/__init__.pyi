@@ -100,3 +100,5 @@ from nldyn.system.stop import dashpot_for as dashpot_for
 from nldyn.system.stop import dissipation_for as dissipation_for
 from nldyn.system.stop import hertz_stiffness as hertz_stiffness
 from nldyn.system.system import System as System
+
+__version__: str

@@ -1,6 +1,10 @@
 /* The link to the program that called: other threads, Ctrl-C, BLAS. */
 #include "engine.h"
 
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
+
 #define PAUSE 0.05 /* s between two looks whether Ctrl-C was pressed */
 #define LARGE 32   /* inner length from which a product of matrices is left to BLAS */
 
@@ -66,13 +70,35 @@ static void multiply_transposed(const Watch *watch, const double *A, const doubl
         combine(C + (size_t)i * columns, NULL, columns, B, columns, A + i, rows, inner);
 }
 
-/* whether the processor has all that the wider form of the library is compiled for */
+/* whether the processor and the system have all that the wider form of the library is compiled
+ * for: AVX2, FMA, F16C, BMI, LZCNT and MOVBE [Intel SDM, CPUID and XGETBV] */
+#if defined(__x86_64__)
 EXPORT int64_t nldyn_runs_v3(void)
 {
-#if defined(__x86_64__) && (defined(__GNUC__) || defined(__clang__))
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-           __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
+    const unsigned first = 1u << 12 | 1u << 22 | 1u << 27 | 1u << 28 | 1u << 29; /* leaf 1, ecx */
+    const unsigned seventh = 1u << 3 | 1u << 5 | 1u << 8;                        /* leaf 7, ebx */
+    const unsigned lzcnt = 1u << 5, wide_registers = 6;
+    unsigned a, b, c, d;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || (c & first) != first) return 0;
+    if (!__get_cpuid_count(7, 0, &a, &b, &c, &d) || (b & seventh) != seventh) return 0;
+    if (!__get_cpuid(0x80000001u, &a, &b, &c, &d) || !(c & lzcnt)) return 0;
+    __asm__ volatile("xgetbv" : "=a"(a), "=d"(d) : "c"(0)); /* those that the system saves */
+    return (a & wide_registers) == wide_registers;
+}
 #else
-    return 0;
+EXPORT int64_t nldyn_runs_v3(void) { return 0; }
+#endif
+
+/* the compiler of the library, as "clang 21.1" */
+#define QUOTED(text) #text
+#define VERSION(name, major, minor) name " " QUOTED(major) "." QUOTED(minor)
+EXPORT const char *nldyn_built_by(void)
+{
+#if defined(__clang__)
+    return VERSION("clang", __clang_major__, __clang_minor__);
+#elif defined(__GNUC__)
+    return VERSION("gcc", __GNUC__, __GNUC_MINOR__);
+#else
+    return "a C compiler";
 #endif
 }

@@ -109,3 +109,16 @@ def function(name: str, *arguments: Any, result: Any = ctypes.c_int64) -> Any:
     found = LIBRARY[name]
     found.argtypes, found.restype = arguments, result
     return found
+
+
+def built_by() -> str:
+    """What the library was compiled by, and for which processors.
+
+    Examples
+    --------
+    >>> built_by().startswith(("gcc", "clang"))
+    True
+    """
+    name: bytes = function("nldyn_built_by", result=ctypes.c_char_p)()
+    wide = Path(LIBRARY._name).stem.endswith("v3")
+    return f"{name.decode()} for {'processors with AVX2' if wide else 'all processors'}"
