@@ -3,13 +3,13 @@
 # speed against error, `make hard` computes the hard cases, `make faults` tries thousands of bad
 # inputs and hundreds of kills, `make docs` builds the site of the documentation, `make slow` runs all
 # tests that are too long for `make test`, `make sanitize` looks for faults of memory in the engine,
-# `make wheels` builds what a release uploads, for all platforms, and `make installed` tests it here.
+# `make wheels` builds what a release uploads, for all platforms.
 # All set up a virtual environment in .venv first.
 PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: paper atlas test slow check bench hard faults sanitize wheels installed docs clean
+.PHONY: paper atlas test slow check bench hard faults sanitize wheels docs clean
 
 $(VENV)/.installed: pyproject.toml compile_engine.py $(wildcard nldyn/engine/*.[ch])
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
