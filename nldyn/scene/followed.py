@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from nldyn.base.errors import SceneError, SystemModelError
-from nldyn.orbits.axis import Axis
 from nldyn.scene.checks import STEADY
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import KeyPath, scene_error, unknown_name
@@ -12,6 +13,9 @@ from nldyn.scene.stops_and_loads import slider_of, sources_before
 from nldyn.system.chart import EVERY_MODE, SPEED, SPIN, THE_FREQUENCY
 from nldyn.system.parameters import OF_STOPS, SOURCES, Parameter
 from nldyn.system.system import System
+
+if TYPE_CHECKING:
+    from nldyn.orbits.axis import Axis
 
 KEY: KeyPath = ("continuation", "parameter")
 OF_LISTS = {  # the keys of each list of tables that may change
@@ -37,6 +41,8 @@ def axis_of(scene: Scene, system: System) -> Axis:
     SceneError
         If the system has no such number, or it cannot have these values.
     """
+    from nldyn.orbits.axis import Axis  # check computes nothing
+
     table = scene.continuation
     assert table is not None
     parameter = followed_parameter(scene)
