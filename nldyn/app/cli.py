@@ -287,7 +287,8 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
             if not only_simulated(loaded):
                 check_computable(loaded, scene)
                 check_held_to_follow(loaded, system)
-                axis_of(loaded, system)
+                if loaded.continuation is not None and loaded.continuation.parameter:
+                    axis_of(loaded, system)
 
         if as_json:
             from nldyn.report.modes import mode_table

@@ -70,8 +70,8 @@ def describe_system(system: System, residual: int = 0) -> str:
 
 def describe_rest(system: System) -> list[str]:
     """Say where the structure rests, and what holds it, if that is not at zero."""
-    from nldyn.orbits.history import moment_unit
     from nldyn.system.equilibrium import closed_at_rest, rest_positions
+    from nldyn.system.naming import moment_unit
 
     found = rest_positions(system)
     q, others = found[0], found[1:]
@@ -99,7 +99,7 @@ def _places(system: System, q: Real) -> str:
 
 def describe_stop(stop: AnyStop, length: str = "m") -> str:
     """Say in a line where a stop is and what it does; of a rotation the length is rad."""
-    from nldyn.orbits.history import moment_unit
+    from nldyn.system.naming import moment_unit
     from nldyn.system.rigid_stop import RigidStop
 
     if isinstance(stop, RigidStop):
@@ -120,7 +120,7 @@ def describe_stop(stop: AnyStop, length: str = "m") -> str:
 
 def describe_spring(spring: AnySpring, length: str = "m") -> str:
     """Say in a line where a spring is and what it does; of a rotation the length is rad."""
-    from nldyn.orbits.history import moment_unit
+    from nldyn.system.naming import moment_unit
 
     unit = f"{moment_unit(length)}/{length}"
     where = f"at '{spring.at}'" + (f" against '{spring.against}'" if spring.against else "")

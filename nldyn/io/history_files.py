@@ -14,8 +14,9 @@ from scipy.io import savemat
 from nldyn.base.arrays import SLACK
 from nldyn.base.errors import SystemModelError, check_types
 from nldyn.base.optional import optional
-from nldyn.orbits.history import History, moment_unit
+from nldyn.orbits.history import History
 from nldyn.runtime.files import check_writable, write_whole
+from nldyn.system.naming import moment_unit
 
 SI_UNITS = {
     "type": 164,

@@ -11,21 +11,11 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.optional import optional
 from nldyn.base.version import software_version
+from nldyn.system.naming import moment_unit
 
 if TYPE_CHECKING:
     import pandas
     import xarray
-
-
-def moment_unit(unit: str) -> str:
-    """Unit of what acts along a displacement of a unit.
-
-    Examples
-    --------
-    >>> moment_unit("rad"), moment_unit("m")
-    ('N m', 'N')
-    """
-    return "N m" if unit == "rad" else "N"
 
 
 def told(units: Iterable[str]) -> str:

@@ -12,6 +12,17 @@ def is_angle(direction: str) -> bool:
     return direction.startswith("rotation")
 
 
+def moment_unit(unit: str) -> str:
+    """Unit of what acts along a displacement of a unit.
+
+    Examples
+    --------
+    >>> moment_unit("rad"), moment_unit("m")
+    ('N m', 'N')
+    """
+    return "N m" if unit == "rad" else "N"
+
+
 def stop_name(stops: Sequence[AnyStop], index: int) -> str:
     """Name a stop by its interfaces and, where several share them, by its direction and gap.
 
