@@ -41,9 +41,23 @@ class Contact:
         return float(self.tangent @ y[self.tangent.size :]) - self.law.base_speed
 
 
+@dataclass(frozen=True)
+class Wall:
+    """A rigid stop that ``normal . q`` hits at a gap."""
+
+    normal: Vector
+    gap: float
+    restitution: float
+
+    def open(self, y: Vector) -> float:
+        return self.gap - float(self.normal @ y[: self.normal.size])
+
+
 @dataclass
 class Body:
     """M q'' + C q' + K q = load(t) - contact forces, with a mode of each contact.
+
+    It rebounds from walls, and does not come to rest on them.
 
     Modes: nan for an open one, 0 where it sticks, else the sign of its speed.
     """
@@ -53,6 +67,7 @@ class Body:
     stiffness: Vector
     load: Callable[[float], Vector]
     contacts: list[Contact]
+    walls: list[Wall] = field(default_factory=list)
     modes: list[float] = field(default_factory=list)
 
     def acting(self, t: float, y: Vector) -> tuple[Vector, dict[int, float]]:
@@ -115,6 +130,8 @@ class Body:
                 found.append((i, "slip", lambda t, y, i=i: self._margin(t, y, i)))
             elif not np.isnan(mode):
                 found.append((i, "stop", lambda t, y, c=contact, s=mode: s * c.slip(y)))
+        for i, wall in enumerate(self.walls):
+            found.append((i, "hit", lambda t, y, w=wall: w.open(y)))
         for _, _, event in found:
             event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
         return found
@@ -123,6 +140,8 @@ class Body:
         return self.grip(i, y) - abs(self.acting(t, y)[1][i])
 
     def pass_event(self, t: float, y: Vector, i: int, kind: str) -> Vector:
+        if kind == "hit":
+            return self.rebound(t, y, self.walls[i])
         contact = self.contacts[i]
         if kind == "slip":
             self.modes[i] = float(np.sign(self.acting(t, y)[1][i]))
@@ -136,6 +155,19 @@ class Body:
             y = y.copy()
             y[push.size :] -= push * contact.slip(y) / float(contact.tangent @ push)
             self.let_slip(t, y)
+        return y
+
+    def rebound(self, t: float, y: Vector, wall: Wall) -> Vector:
+        """The state behind an impact; what acts then slides or sticks by its new speed."""
+        n, push = y.size // 2, np.linalg.solve(self.mass, wall.normal)
+        y = y.copy()
+        speed = float(wall.normal @ y[n:])
+        y[n:] -= push * (1.0 + wall.restitution) * speed / float(wall.normal @ push)
+        self.modes = [
+            mode if np.isnan(mode) else self.pressed_mode(contact, y)
+            for contact, mode in zip(self.contacts, self.modes, strict=True)
+        ]
+        self.let_slip(t, y)
         return y
 
     def followed(self, y: Vector, end: float, longest: float) -> tuple[Vector, int]:

@@ -14,6 +14,7 @@ import click
 if TYPE_CHECKING:
     from nldyn.base.arrays import Real
     from nldyn.search.diagram import Diagram
+    from nldyn.system.friction import Slider
     from nldyn.system.rigid_stop import AnyStop
     from nldyn.system.system import AnySpring, System
 
@@ -62,6 +63,7 @@ def describe_system(system: System, residual: int = 0) -> str:
         lines.append(f"of the rotation of {turning}: rad for m, N m for N")
     lines += [describe_stop(stop, system.unit(stop.at)) for stop in system.stops]
     lines += [describe_spring(spring, system.unit(spring.at)) for spring in system.springs]
+    lines += [describe_slider(slider) for slider in system.sliders]
     if np.any(system.spring_stiffness):
         hz = ", ".join(f"{value:.6f}" for value in system.linear.frequencies_hz)
         lines.append(f"frequencies with the springs: {hz} Hz")
@@ -129,6 +131,17 @@ def describe_spring(spring: AnySpring, length: str = "m") -> str:
     return f"spring {where}: {', '.join(terms) or f'0 {unit}'}"
 
 
+def describe_slider(slider: Slider) -> str:
+    """Say in a line where something slides, and what presses it on."""
+    law = slider.friction
+    where = f"at '{slider.at}'" + (f" against '{slider.against}'" if slider.against else "")
+    told = f"friction {where}: coefficient {law.coefficient:.6g}"
+    told += f", at rest {law.at_rest:.6g}" if law.adhesion else ""
+    told += f", base at {law.base_speed:.6g} m/s" if law.base_speed else ""
+    pressing = f"stop {slider.stop}" if slider.stop >= 0 else f"{slider.normal_force:.6g} N"
+    return f"{told}, pressed on by {pressing}"
+
+
 def _place(stop: AnyStop) -> str:
     return f"at '{stop.at}'" + (f" against '{stop.against}'" if stop.against else "")
 
@@ -155,6 +168,7 @@ def described_as_json(system: System) -> dict[str, object]:
             name: static_flexibility(system, name) for name in system.interfaces
         },
         "stops": [describe_stop(stop, system.unit(stop.at)) for stop in system.stops],
+        "friction": [describe_slider(slider) for slider in system.sliders],
     }
 
 

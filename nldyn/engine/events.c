@@ -330,6 +330,16 @@ static void find_event(const Motion *M, int kind, double phase, double h, int st
     }
 }
 
+/* whether a slider that sticks keeps an open stop where it is: what is shut may not close then */
+static bool held_open(const Motion *M, int stop)
+{
+    for (int s = 0; s < M->fl->n_stops; s++)
+        if (is_slider(M->fl, s) && M->closed[s] && M->fl->slides[s] == 0 &&
+            moves_with(M->fl, s, stop))
+            return true;
+    return false;
+}
+
 /* the first event within a panel */
 static Event first_event(const Motion *M, int kind, double phase, double h)
 {
@@ -340,6 +350,7 @@ static Event first_event(const Motion *M, int kind, double phase, double h)
     for (int stop = 0; stop < fl->n_stops; stop++) {
         if (M->closed[stop]) position++; /* a bond is always closed */
         if (is_bond(fl, stop) || (is_slider(fl, stop) && !M->closed[stop])) continue;
+        if (is_rigid(fl, stop) && !M->closed[stop] && held_open(M, stop)) continue;
         if (!is_slider(fl, stop)) {
             int out = watched(fl, stop, M->closed, M->w, phase);
             Shown shown = show_stop(M, kind, phase, h, stop, out, position);

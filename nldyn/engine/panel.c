@@ -13,6 +13,7 @@
 #define SOLVED 1e-13  /* relative change of the penetrations that Newton's method would still make */
 #define SLOWEST 1e-3  /* 1 - rate of its convergence, at least, in the estimate of that */
 #define LARGEST_ANGLE 1e5 /* that `fill_sines` is left to */
+#define ALONG 1e-9   /* of the cosine squared: a slider that moves as a stop does */
 #define STALE 0.1     /* rate from which its matrix is inverted anew */
 
 /* make the panel an empty one for some closed stops */
@@ -53,6 +54,13 @@ static double between(const Flow *fl, int stop, int other)
     const double *row = row_of(fl, 1, stop), *push = push_of(fl, other);
     for (int k = 0; k < fl->size; k++) mobility += row[k] * push[k];
     return mobility;
+}
+
+/* whether a slider moves as another stop does */
+static bool moves_with(const Flow *fl, int slider, int stop)
+{
+    double both = stop_of(fl, slider)->mobility * stop_of(fl, stop)->mobility;
+    return squared(between(fl, slider, stop)) >= (1.0 - ALONG) * both;
 }
 
 /* fill the rows of a block in to, rise and back, by its exponentials: there (4, m), back (4, m) and

@@ -226,6 +226,25 @@ static void hold(Motion *M, double phase, double t, const double *shift)
     }
 }
 
+/* Leave sliders out that move as a rigid stop does on which a body rests: that holds them, and what
+ * they would hold is not told. They are taken back when it lets go. */
+static void hand_over_sliders(const Motion *M)
+{
+    const Flow *fl = M->fl;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!is_slider(fl, s)) continue;
+        bool acts = !is_pressed(fl, s) || M->closed[(int)stop_of(fl, s)->normal];
+        for (int r = 0; r < fl->n_stops && acts; r++) {
+            if (!(is_rigid(fl, r) && M->closed[r])) continue;
+            acts = !moves_with(fl, s, r);
+        }
+        if (acts == M->closed[s]) continue;
+        M->closed[s] = acts;
+        fl->slides[s] = 0;
+        M->panel->na = -1;
+    }
+}
+
 /* let sliders slide whose speed is more than so many `roundings` */
 static void loosen_sliders(const Motion *M, double phase, double roundings)
 {
@@ -316,6 +335,7 @@ static void close_shut(Motion *M, int first, double phase, double roundings, con
         shut = shut || depth >= -roundings * output_noise(fl, s, M->w);
         M->closed[s] = shut && fabs(at.first) <= roundings * rate_noise(fl, s, M->w);
     }
+    hand_over_sliders(M);
     contact_forces(M, phase);
     for (int s = 0; s < fl->n_stops; s++) {
         if (!is_rigid(fl, s) || M->closed[s]) continue;
@@ -324,6 +344,7 @@ static void close_shut(Motion *M, int first, double phase, double roundings, con
         bool shut = depth >= -roundings * output_noise(fl, s, M->w);
         M->closed[s] = shut && at.first < 0.0 && is_low(M, s, -at.first, M->s->pushes[s]);
     }
+    hand_over_sliders(M);
 }
 
 /* Close the rigid stops on which the body rests now and open the others. A gap and a rate of so
@@ -344,6 +365,7 @@ static void settle(Motion *M, int first, double phase, double t, const double *s
         }
         if (weakest < 0) break;
         M->closed[weakest] = false;
+        hand_over_sliders(M);
     }
     hold(M, phase, t, shift);
 }
@@ -399,8 +421,12 @@ static void impact(Motion *M, int first, bool crossed, double phase, double t)
         M->bounces[hit]++;
         M->closings[hit]++;
     }
+    for (int s = 0; s < fl->n_stops; s++) /* an impact may turn any of them */
+        if (is_slider(fl, s)) fl->slides[s] = 0;
+    M->panel->na = -1;
     loosen_sliders(M, phase, SHUT);
     settle(M, first, phase, t, shift, SHUT, struck);
+    slip_overloaded(M, phase);
     for (int s = 0; s < fl->n_stops; s++) {
         if (!(struck[s] && M->closed[s] && M->bounces[s] > 0)) continue;
         M->closings[s] -= M->bounces[s] - 1;

@@ -92,10 +92,13 @@ static void pass_event(Motion *M, int event, double h)
     if (is_slider(M->fl, event)) {
         slide_or_stick(M, event, here, M->t);
     } else if (is_rigid(M->fl, event)) {
-        if (M->closed[event])
+        if (M->closed[event]) {
             M->closed[event] = false;
-        else
+            hand_over_sliders(M);
+            slip_overloaded(M, here);
+        } else {
             impact(M, event, true, here, M->t);
+        }
         leave_rigid_stops(M, event, here);
     } else {
         switch_stop(M, event, here, M->t);

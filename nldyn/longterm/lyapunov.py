@@ -269,6 +269,8 @@ def spectrum_from(
     errors[np.isfinite(means)] = standard_errors(rates[:, np.isfinite(means)])
     order = np.argsort(-means, kind="stable")
     divergence = -float(np.trace(flow.system.total_damping))
+    if flow.system.sliders:  # what turns and sticks takes a share of its own
+        divergence = math.nan
     divergence -= viscous / (periods * 2.0 * math.pi / omega)
     return LyapunovSpectrum(
         omega / (2.0 * math.pi),

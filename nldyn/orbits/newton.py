@@ -60,8 +60,9 @@ def first_orbit(
 
 
 def check_bounded(flow: FlowMap, omega: float) -> None:
-    """Refuse the resonance of an undamped mode where no stop can limit the motion."""
-    if not flow.system.stops and not flow.system.bonds:
+    """Refuse the resonance of an undamped mode where nothing else can limit the motion."""
+    system = flow.system
+    if not (system.stops or system.bonds or system.sliders):
         flow.response(omega).steady(omega)
 
 

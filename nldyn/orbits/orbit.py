@@ -300,8 +300,10 @@ class Orbit:
         v² is the velocity jump per unit impulse at a stop whose force depends on the speed. An
         impact with a rigid stop multiplies the determinant by e (e + v de/dv). The
         determinant is the product of those of the segments. The error is nan where damping is so
-        strong that rounding hides the third digit of 1e-6 even so.
+        strong that rounding hides the third digit of 1e-6 even so, and with dry friction.
         """
+        if self.system.sliders:
+            return math.nan
         value, rounding = log_determinant(self._spectrum[1])
         if rounding > LOST:
             return math.nan

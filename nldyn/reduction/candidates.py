@@ -124,7 +124,8 @@ def in_use(model: cms.ReducedModel, setting: LoadCase) -> Real:
         *setting.springs,
     )
     names = {element.at for element in (*pairs, *setting.excitation)}
-    names |= {element.against for element in pairs if element.against is not None}
+    ends = [(e, end) for e in pairs for end in ("against", "tangent", "tangent_against")]
+    names |= {getattr(e, end) for e, end in ends if getattr(e, end, None) is not None}
     names.add(setting.observe or model.interfaces[0])
     return np.array([model.participation[name] for name in model.interfaces if name in names])
 

@@ -18,8 +18,6 @@ KeyPath = tuple[str | int, ...]
 MOST_SHOWN, LONGEST_SHOWN = 20, 60  # names in a list, letters of a name
 BETWEEN = "what joins two interfaces is [[springs]] and [[dampers]] with 'at' and 'against'"
 WORDS = {  # that users try for a table, and what there is
-    "friction": "friction is not modelled; there are [[stops]], which push along their normal and "
-    "lose energy by 'dissipation' or 'restitution', and linear [[dampers]]",
     "force": "forces are [[excitation]] of kind 'harmonic', 'constant' or 'measured'",
     "load": "loads are [[excitation]] of kind 'harmonic', 'constant', 'measured' or 'weight'",
     "gravity": "gravity is [[excitation]] of kind 'weight', with 'acceleration'",

@@ -135,7 +135,6 @@ class DryFriction:
         check_positive(owner, "normal_force", self.normal_force)
         object.__setattr__(self, "friction", as_friction(owner, self.friction))
 
-
     @property
     def law(self) -> Friction:
         """The law of friction."""

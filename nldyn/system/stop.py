@@ -326,9 +326,10 @@ class Stop:
             raise SystemModelError(f"{owner}: friction needs both friction and tangent")
         if self.tangent in (self.at, self.tangent_against):
             raise SystemModelError(f"{owner}: tangent must be another interface")
-        if self.dashpot and self.pulls:
+        if (self.dashpot and self.pulls) or self.dissipation or self.law is not None:
             raise SystemModelError(
-                f"{owner}: a dashpot that pulls leaves no force for friction; give pulls = False"
+                f"{owner}: friction needs a force that never pulls: no dissipation, no law of your "
+                "own, and a dashpot only with pulls = False"
             )
         object.__setattr__(self, "friction", as_friction(owner, self.friction))
 

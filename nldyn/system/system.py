@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -44,6 +45,7 @@ AnyDamper = Damper | CubicDamper | DryFriction
 LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
 NEGATIVE = 1e-10  # of a stiffness with a unit diagonal: an eigenvalue that is not rounding
 NOT_HELD = "the structure is free to move in a way that no stop limits, and nothing tells its place"
+MOST_SIDES = 1024  # of stops to both sides, which are tried together
 FEW = 8.0  # roundings of each mode in the largest ω²
 
 
@@ -817,13 +819,8 @@ class System:
             raise SystemModelError(f"'{min(both)}' names both an interface and a load vector")
 
     def _check_sliders(self) -> None:
-        """Refuse sliders that stick together in every mode: what each holds would not be told."""
-        sliders = self.sliders
-        if not sliders:
-            return
-        always = [s for s in sliders if s.stop < 0 or self.stops[s.stop].gap < 0.0]
-        for one in [None, *(s for s in sliders if s not in always)]:
-            together = always if one is None else [*always, one]
+        """Refuse sliders that hold one motion together: what each holds would not be told."""
+        for together in self._sliders_at_once() if self.sliders else ():
             rows = [self.vector_between(s.at, s.against) for s in together]
             if _rank(rows, self.size) < len(rows):
                 names = ", ".join(f"'{s.at}'" for s in together)
@@ -832,6 +829,21 @@ class System:
                     "modes, so that nothing tells what each holds where they stick: merge them, or "
                     "keep more modes"
                 )
+
+    def _sliders_at_once(self) -> Iterator[list[Slider]]:
+        """Sliders that may stick at once: of stops to both sides of a gap, those of one side."""
+        sides: dict[tuple[str, str | None], set[int]] = {}
+        pressed = [(slider, self.stops[slider.stop]) for slider in self.sliders if slider.stop >= 0]
+        for _, stop in pressed:
+            sides.setdefault((stop.at, stop.against), set()).add(stop.direction)
+        dry = [slider for slider in self.sliders if slider.stop < 0]
+        for chosen in itertools.islice(itertools.product(*sides.values()), MOST_SIDES):
+            side = dict(zip(sides, chosen, strict=True))
+            yield dry + [
+                slider
+                for slider, stop in pressed
+                if stop.gap < 0.0 or side[stop.at, stop.against] == stop.direction
+            ]
 
     def _check_interfaces(self) -> None:
         known = ", ".join(self.participation) or "none"

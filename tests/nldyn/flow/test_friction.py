@@ -4,12 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from sliding import Body, Contact
+from sliding import Body, Contact, Wall
 
 from nldyn import (
+    ConstantForce,
     FlowMap,
     HarmonicForce,
     Parameter,
+    RigidStop,
     Stop,
     System,
     SystemModelError,
@@ -77,7 +79,7 @@ def test_den_hartogs_amplitude_of_motion_without_stops(ratio, share):
     assert work == pytest.approx(4.0 * share * amplitude, rel=1e-5)  # of the trapezoids
 
 
-def drawn(seed):
+def drawn(seed, walled=False):
     """A random structure with friction at stops and all the time, the same for both ways."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 4))
@@ -85,7 +87,7 @@ def drawn(seed):
     M, K = np.diag(rng.uniform(0.5, 2.0, n)), A @ A.T + np.eye(n)
     C, names, unit = 0.05 * K + 0.02 * M, [f"x{i}" for i in range(n)], np.eye(n)
     omega, forces, phases = rng.uniform(0.5, 2.0), 3.0 * rng.random(n), rng.uniform(0.0, 360.0, n)
-    contacts, stops, dry = [], [], []
+    contacts, stops, dry, walls = [], [], [], []
     for b in rng.permutation(n)[: int(rng.integers(1, n + 1))]:
         law = Friction(float(rng.uniform(0.05, 0.8)), base_speed=float(rng.choice([0.0, 0.3])))
         if rng.random() < 0.4:
@@ -100,8 +102,13 @@ def drawn(seed):
         k, gap = float(rng.uniform(20.0, 200.0)), float(rng.uniform(-0.1, 0.8))
         contacts.append(Contact(unit[b], law, 0.0, sign * unit[a], k, p, gap))
         stops.append(Stop(names[a], k, p, gap, sign, friction=law, tangent=names[b]))
+    if walled:
+        a, sign, gap = int(rng.integers(n)), int(rng.choice([1, -1])), float(rng.uniform(0.1, 0.6))
+        if all(contact.tangent[a] == 0.0 for contact in contacts):
+            walls.append(Wall(sign * unit[a] + 0.0, gap, 0.7))
+            stops.append(RigidStop(names[a], 0.7, gap, sign))
     turn = np.radians(phases)
-    body = Body(M, C, K, lambda t: forces * np.cos(omega * t + turn), contacts)
+    body = Body(M, C, K, lambda t: forces * np.cos(omega * t + turn), contacts, walls)
     system = System.from_matrices(
         M, K, dict(zip(names, unit, strict=True)), damping=C, stops=stops, dampers=dry,
         excitation=[HarmonicForce(*row) for row in zip(names, forces, phases, strict=True)],
@@ -109,8 +116,8 @@ def drawn(seed):
     return system, body, omega, 0.7 * rng.normal(size=2 * n), float(rng.uniform(1.0, 3.0))
 
 
-def agrees(seed):
-    system, body, omega, start, turns = drawn(seed)
+def agrees(seed, walled=False):
+    system, body, omega, start, turns = drawn(seed, walled)
     phases = np.array([0.0, 2.0 * math.pi * turns])
     expected, _ = body.followed(start, phases[1] / omega, 0.2 / omega)
     flow, z = FlowMap(system), to_state(system, start)[None]
@@ -126,12 +133,20 @@ def agrees(seed):
     by = np.array([(up - down) / (2.0 * step) for up, down in moved]).T
     np.testing.assert_allclose(found.jacobians[0], by, atol=3e-5 * max(np.abs(by).max(), 1.0))
     up, down = (flow.shoot(z, phases, omega * (1.0 + way * step)).ends[0] for way in (1.0, -1.0))
-    np.testing.assert_allclose(found.d_omega[0], (up - down) / (2.0 * step * omega), atol=3e-5)
+    by_omega = (up - down) / (2.0 * step * omega)
+    np.testing.assert_allclose(
+        found.d_omega[0], by_omega, atol=3e-5 * max(np.abs(by_omega).max(), 1.0)
+    )
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_random_systems_agree_with_integration_from_event_to_event(seed):
     agrees(seed)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_impacts_on_rigid_stops_turn_what_slides(seed):
+    agrees(seed, walled=True)
 
 
 @pytest.mark.slow
@@ -172,9 +187,34 @@ def test_a_branch_goes_on_where_a_block_begins_to_stick_and_is_saved(tmp_path):
     assert again.points[0].system.sliders == first.system.sliders
     for orbit in branch.points[:: max(len(branch.points) // 7, 1)]:
         alone = solve_orbit(orbit.system, orbit.frequency_hz)
-        assert orbit.max_abs_displacement == pytest.approx(
-            alone.max_abs_displacement, rel=1e-8
-        )
+        assert orbit.max_abs_displacement == pytest.approx(alone.max_abs_displacement, rel=1e-8)
+
+
+def pushed(swing):
+    """A block on friction that a constant force holds against a rigid wall."""
+    return System.from_matrices(
+        [[1.0]], [[1.0]], {"x": [1.0]}, damping=[[0.1]], stops=[RigidStop("x", 0.5, 0.5)],
+        dampers=[DryFriction("x", 1.0, 0.3)],
+        excitation=[ConstantForce("x", 2.0), HarmonicForce("x", swing)],
+    )  # fmt: skip
+
+
+def test_a_block_on_friction_rests_against_a_wall_and_is_let_go():
+    for swing in (0.0, 3.0):
+        system = pushed(swing)
+        phases = np.array([0.0, 40.0 * math.pi]) + math.pi * (swing > 0.0)
+        start = to_state(system, np.array([0.0, 0.0]))[None]
+        found = FlowMap(system).shoot(start, phases, 0.3)
+        assert found.failure == ""
+        x, v = from_state(system, found.ends[0])
+        if swing == 0.0:
+            assert abs(x - 0.5) < 1e-12
+            assert abs(v) < 1e-12
+        else:
+            assert x < 0.4
+    orbit = solve_orbit(pushed(3.0), 0.3 / (2.0 * math.pi))
+    assert orbit.rests
+    assert orbit.flow_error.state < 1e-8
 
 
 def test_friction_of_zero_changes_nothing():
@@ -201,7 +241,11 @@ def test_friction_of_zero_changes_nothing():
         (lambda: Stop("x", 1.0, friction=0.2, tangent="x"), "tangent must be another"),
         (
             lambda: Stop("x", 1.0, 1.0, dashpot=0.1, tangent="y", friction=0.2),
-            "a dashpot that pulls",
+            "never pulls",
+        ),
+        (
+            lambda: Stop("x", 1.0, dissipation=0.1, tangent="y", friction=0.2),
+            "never pulls",
         ),
     ],
 )
@@ -211,8 +255,14 @@ def test_bad_numbers_are_refused_in_a_sentence(make, told):
 
 
 def test_what_one_mode_cannot_tell_apart_is_refused():
-    with pytest.raises(SystemModelError, match="not independent in 1 modes"):
-        System.from_modal(
-            [1.0], {"x": [1.0], "y": [2.0]},
-            dampers=[DryFriction("x", 1.0, 0.1), DryFriction("y", 1.0, 0.1)],
-        )  # fmt: skip
+    rough = {"tangent": "y", "friction": 0.2}
+    both_sides = [Stop("x", 1.0, gap=0.1, direction=sign, **rough) for sign in (1, -1)]
+    names = {"x": [1.0, 0.0], "y": [0.0, 1.0]}
+    System.from_modal([1.0, 2.0], names, stops=both_sides)
+    for elements in (
+        {"dampers": [DryFriction("x", 1.0, 0.1), DryFriction("y", 1.0, 0.1)]},
+        {"stops": [Stop("x", 1.0, gap=0.1, **rough), Stop("x", 9.0, gap=0.2, **rough)]},
+    ):
+        rows = {"x": [1.0], "y": [2.0]} if len(elements.get("dampers", ())) == 2 else names
+        with pytest.raises(SystemModelError, match="not independent"):
+            System.from_modal([1.0, 2.0][: len(rows["x"])], rows, **elements)

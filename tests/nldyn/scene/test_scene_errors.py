@@ -474,7 +474,6 @@ def test_negative_gap_is_a_preload(tmp_path):
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ("[[friction]]", "friction is not modelled; there are [[stops]]"),
         ("[[forces]]", "forces are [[excitation]] of kind 'harmonic', 'constant' or 'measured'"),
         ("[gravity]", "gravity is [[excitation]] of kind 'weight'"),
         ("[[masses]]", "masses on a mesh are [[point_masses]]"),
