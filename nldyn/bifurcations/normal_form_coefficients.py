@@ -245,7 +245,7 @@ def loop_of(place: Place) -> Loop:
     closes, and which are closed at the nodes.
     """
     family = place.family
-    if family.problem.system.sliders:
+    if family.problem.flow.system.sliders:
         raise CoefficientError("dry friction bends the motion wherever something turns or sticks")
     finer = replace(family, problem=replace(family.problem, flow=family.problem.flow.finer))
     nodes = place.point[:-1].reshape(family.segments, -1)
