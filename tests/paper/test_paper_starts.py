@@ -73,7 +73,7 @@ def test_what_is_followed_from_starts_is_what_the_search_found(found, tmp_path):
 def test_a_missing_branch_is_told_by_its_indices(found):
     through = next(b for b in found.branches if index_sum([b], 36.0, b.period) not in (0, 1))
     others = [branch for branch in found.branches if branch is not through]
-    assert f"but for P^{through.period} from " in index_note(others, found.limits, 3)
+    assert f"but for P^{through.period} from " in index_note(others, found.axis, 3)
 
 
 def test_what_is_no_orbit_among_the_starts_is_counted(found):

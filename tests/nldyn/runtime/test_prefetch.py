@@ -24,7 +24,7 @@ from nldyn.orbits import OrbitSearchOptions
 from nldyn.runtime.prefetch import Ahead, computing_ahead
 
 WANTED = {
-    "range_hz": (30.0, 60.0),
+    "limits": (30.0, 60.0),
     "periods": [1, 2],
     "search_points": 3,
     "search": OrbitSearchOptions(starts=4),
