@@ -320,7 +320,7 @@ def diagram(
     >>> found = diagram(system, (0.0, 1e-5), [1], parameter="gap", frequency_hz=8.7,
     ...     search_points=1, search=one)
     >>> found
-    <Diagram of gap = 0 to 1e-05 m at 8.7 Hz, of 'middle': 1 branch of period 1, 0 special points>
+    <Diagram of gap = 0 to 1e-05 m at 8.7 Hz, of 'middle': 1 branch of period 1, 6 special points>
     """
     flow = flow_of(system)
     axis = Axis.of(flow.system, limits, parameter, frequency_hz)
