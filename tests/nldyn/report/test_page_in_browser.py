@@ -20,6 +20,8 @@ const box = plot.getBoundingClientRect();
 return [box.left + full.xaxis._offset + full.xaxis.l2p(arguments[0]),
         box.top + full.yaxis._offset + full.yaxis.l2p(arguments[1])];
 """
+# clicks of a test may follow one another so quickly that Plotly takes the second for a double click
+SINGLE = "document.getElementById('diagram')._context.doubleClickDelay = 0"
 MARKS = """
 return document.getElementById("diagram").data.flatMap((trace) =>
   (trace.customdata || []).map((place, i) => [...place, trace.x[i], trace.y[i]]));
@@ -59,6 +61,7 @@ def folder(tmp_path_factory):
 def browser(folder, tmp_path_factory):
     with opened(folder / "report.html", tmp_path_factory.mktemp("downloads")) as browser:
         browser.downloads = tmp_path_factory.getbasetemp()
+        browser.execute_script(SINGLE)
         yield browser
 
 
