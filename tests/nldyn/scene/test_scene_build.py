@@ -246,12 +246,16 @@ def test_tolerance_of_a_scene_is_that_of_its_flow_map(monkeypatch):
 
 
 def test_the_beam_of_solids_moves_as_the_frame():
-    """Same scene, other mesh: orbits with contact agree as the reduced models do."""
+    """Same scene, other mesh: orbits with contact agree as the reduced models do.
+
+    At 20 Hz, where both settle from rest to the motion with one impact a period; at 25 Hz there are
+    several stable ones, and last digits decide which is found.
+    """
     from nldyn import solve_orbit
 
     heights = []
     for name in ("four_dof_xi_0.01.toml", "solid_beam.toml"):
-        orbit = solve_orbit(build_system(load_scene(example(name))), frequency_hz=25.0)
+        orbit = solve_orbit(build_system(load_scene(example(name))), frequency_hz=20.0)
         heights.append((orbit.max_abs_displacement, orbit.max_penetration))
     np.testing.assert_allclose(heights[1], heights[0], rtol=1e-2)
 
