@@ -104,8 +104,7 @@ static double time_to_slip(const Motion *M, int s, int kind, double end_phase, d
     const Flow *fl = M->fl;
     const Panel *panel = M->panel;
     double *nodes = M->s->inner;
-    int position = 0;
-    while (panel->active[position] != s) position++;
+    int position = place_of(panel, s);
     int side = at_end(M->tab, panel->F + (size_t)position * panel->m) < 0.0 ? -1 : 1;
     show_slider(fl, panel, position, side, nodes);
     *value = fl->slides[s] != 0 ? slip(fl, s, M->w_end, end_phase) : at_end(M->tab, nodes);

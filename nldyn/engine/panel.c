@@ -198,22 +198,26 @@ static void free_outputs(const Flow *fl, const Gauss *tab, int kind, double phas
                              s->step, s->free + (size_t)o * m);
 }
 
-/* place among the closed stops of the one that presses a closed slider on, or -1 */
+/* place of a stop among the closed ones */
+static int place_of(const Panel *panel, int stop)
+{
+    int place = 0;
+    while (panel->active[place] != stop) place++;
+    return place;
+}
+
+/* that of the one that presses a closed slider on, or -1 */
 static int pressing_place(const Flow *fl, const Panel *panel, int a)
 {
-    if (!is_pressed(fl, panel->active[a]) || is_held(fl, panel->active[a])) return -1;
-    int normal = (int)stop_of(fl, panel->active[a])->normal, place = 0;
-    while (panel->active[place] != normal) place++;
-    return place;
+    int s = panel->active[a];
+    return is_pressed(fl, s) && !is_held(fl, s) ? place_of(panel, (int)stop_of(fl, s)->normal) : -1;
 }
 
 /* force that presses a slider on, at node i of a panel */
 static double normal_at(const Flow *fl, const Panel *panel, int s, int i)
 {
-    int normal = (int)stop_of(fl, s)->normal, place = 0;
-    if (normal < 0) return stop_of(fl, s)->pressing;
-    while (panel->active[place] != normal) place++;
-    return panel->F[place * panel->m + i];
+    if (!is_pressed(fl, s)) return stop_of(fl, s)->pressing;
+    return panel->F[place_of(panel, (int)stop_of(fl, s)->normal) * panel->m + i];
 }
 
 /* add to rows of sliders what they have of the rows of the stops that press them on, in a matrix

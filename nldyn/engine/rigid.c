@@ -205,11 +205,11 @@ static void hold(Motion *M, double phase, double t, const double *shift)
 {
     const Flow *fl = M->fl;
     Scratch *s = M->s;
-    int n = M->with_columns ? M->n_columns : 0;
+    int n = M->with_columns ? M->n_columns : 0, factored = 0; /* rates: the same stops, or more */
     for (int rate = 0; rate < 2; rate++) {
         int count = held_stops(M, rate == 1);
         if (count == 0) continue;
-        factor_mobilities(M, count);
+        if (count != factored) factor_mobilities(M, factored = count);
         fill_offsets(M, phase, t, shift, count, rate, n);
         lu_apply(s->mobility, count, s->mobility_order, s->offsets, 1 + n);
         for (int a = 0; a < count; a++) {
@@ -259,6 +259,13 @@ static void loosen_sliders(const Motion *M, double phase, double roundings)
     }
 }
 
+static bool any_sticks(const Motion *M)
+{
+    for (int s = 0; s < M->fl->n_stops; s++)
+        if (M->closed[s] && is_slider(M->fl, s) && M->fl->slides[s] == 0) return true;
+    return false;
+}
+
 /* let sliders slide that would need more than their friction to stick, the most loaded first */
 static void slip_overloaded(const Motion *M, double phase)
 {
@@ -266,7 +273,7 @@ static void slip_overloaded(const Motion *M, double phase)
     for (int round = 0; round < fl->n_stops; round++) {
         double most = 1.0;
         int loosest = -1;
-        if (held_stops(M, true) == held_stops(M, false)) return;
+        if (!any_sticks(M)) return;
         contact_forces(M, phase);
         const double *forces = M->s->stop_forces;
         for (int s = 0; s < fl->n_stops; s++) {
@@ -287,7 +294,7 @@ static void slip_overloaded(const Motion *M, double phase)
 /* let what sticks at the start of a segment slip where it would need more than its friction */
 static void begin_sliders(Motion *M)
 {
-    if (held_stops(M, true) == held_stops(M, false)) return;
+    if (!any_sticks(M)) return;
     slip_overloaded(M, M->phase);
     for (int c = 0; c < M->n_columns; c++) M->s->moved_shift[c] = 0.0;
     hold(M, M->phase, 0.0, M->s->moved_shift);
