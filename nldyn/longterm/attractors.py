@@ -24,11 +24,13 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.flow.settling import settling_runs, states_after
 from nldyn.longterm.impacts import impacts
 from nldyn.longterm.lyapunov import LyapunovSpectrum, spectrum_from
 from nldyn.longterm.simulation import (
     MOST_PERIODS,
     MOST_RECORDED,
+    PIECE,
     Motion,
     simulate,
     starting_state,
@@ -384,7 +386,7 @@ def attractor_from(
     chaos: list[LyapunovSpectrum] = []
     try:
         while True:
-            run = _strobe(flow, state, omega, window)
+            run = states_after(flow, state, omega, window)
             found = reached_orbit(flow, run, omega, observe, options.max_period, floor)
             if found is not None:
                 return _periodic(flow, frequency_hz, *found, chaos)
@@ -399,7 +401,7 @@ def attractor_from(
             if exponents.vanishing and periods > options.periods:
                 break
             if exponents.decaying:
-                run = _strobe(flow, state, omega, CLOUD)
+                run = states_after(flow, state, omega, CLOUD)
                 found, settling = _slow_orbit(flow, run, omega, observe, floor)
                 if found is not None:
                     return _periodic(flow, frequency_hz, *found, chaos)
@@ -408,7 +410,7 @@ def attractor_from(
             if periods >= LONGEST * options.periods:
                 break
             periods *= 2
-        cloud = _strobe(flow, state, omega, max(CLOUD, window))
+        cloud = states_after(flow, state, omega, max(CLOUD, window))
         end = cloud[-1 - window :]
         found = reached_orbit(flow, end, omega, observe, options.max_period, floor)
     except ConvergenceError as error:
@@ -444,30 +446,20 @@ def _periodic(
     )
 
 
-def _strobe(flow: FlowMap, state: Real, omega: float, periods: int) -> Real:
-    """States z (periods, 2n) after each of some periods from phase zero on."""
-    found = flow.strobe(state, omega, periods)
-    if found.failure:
-        raise ConvergenceError(found.failure)
-    return np.asarray(found.ends)
-
-
 def _settled(flow: FlowMap, state: Real, omega: float, periods: int) -> tuple[Real, float]:
     """State z after a transient, and the least size by which its motion is to be measured.
 
     Forcing sets the size of a motion. Without it a motion has only that which it had on the way,
     and is at rest once it has lost all but `ON_ORBIT` of that.
     """
-    if flow.system.driven:
-        return transient_end(flow, state, omega, periods), 0.0
-    largest = float(np.linalg.norm(state))
-    while periods > 0:
-        run = _strobe(flow, state, omega, min(periods, BLOCK))
-        sizes = np.linalg.norm(run, axis=1)
-        largest = max(largest, float(sizes.max()))
-        state, periods = run[-1], periods - len(run)
-        if float(np.linalg.norm(run - state, axis=1).max()) <= STILL * ON_ORBIT * largest:
-            break
+    free = not flow.system.driven
+    largest = float(np.linalg.norm(state)) if free else 0.0
+    for run in settling_runs(flow, state, omega, periods, BLOCK if free else PIECE):
+        state = run[-1]
+        if free:
+            largest = max(largest, float(np.linalg.norm(run, axis=1).max()))
+            if float(np.linalg.norm(run - state, axis=1).max()) <= STILL * ON_ORBIT * largest:
+                break
     return state, largest
 
 

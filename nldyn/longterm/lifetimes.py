@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, check_whole
+from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.settling import settling_runs, states_after
 from nldyn.longterm.attractors import Attractor, AttractorOptions, reached_orbit
 from nldyn.longterm.lyapunov import spectrum_from
 from nldyn.longterm.simulation import MOST_PERIODS
@@ -207,23 +208,19 @@ def _ended(flow: FlowMap, hz: float, periods: int, state: Real) -> int:
     omega = 2.0 * math.pi * hz
     observe = check_observe(flow.system, None)
     longest = AttractorOptions().max_period
-    for before in range(0, periods - LAST, LOOK):
-        found = flow.strobe(state, omega, min(LOOK, periods - LAST - before))
-        if found.failure:
-            raise ConvergenceError(found.failure)
-        state = found.ends[-1]
-        run = found.ends[-3 * longest - 1 :]
-        if len(run) > 2 * longest and reached_orbit(flow, run, omega, observe, longest, 0.0):
-            return before + len(found.ends)
+    done = 0
+    for run in settling_runs(flow, state, omega, periods - LAST, LOOK):
+        state, done = run[-1], done + len(run)
+        end = run[-3 * longest - 1 :]
+        if len(end) > 2 * longest and reached_orbit(flow, end, omega, observe, longest, 0.0):
+            return done
     length = LAST
     while length <= LONGEST * LAST:
         exponents = spectrum_from(flow, state, omega, length)
         if exponents.chaotic:
             return NOT_ENDED
-        found = flow.strobe(exponents.end, omega, 3 * longest + 1)
-        if found.failure:
-            raise ConvergenceError(found.failure)
-        if reached_orbit(flow, found.ends, omega, observe, longest, 0.0):
+        end = states_after(flow, exponents.end, omega, 3 * longest + 1)
+        if reached_orbit(flow, end, omega, observe, longest, 0.0):
             return periods
         state, length = exponents.end, 2 * length
     return UNCLEAR

@@ -14,12 +14,12 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_whole, numbers
 from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.flow.settling import periods_at_once
 from nldyn.longterm.growth_rates import growth_rates
 from nldyn.longterm.simulation import (
     MOST_PERIODS,
     cases_at,
     is_list,
-    periods_at_once,
     transient_end,
 )
 from nldyn.orbits.orbit import contact_damping

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError
 from nldyn.flow.flow_map import FlowMap, chain
+from nldyn.flow.settling import settling_runs
 from nldyn.longterm.attractors import Attractor
 from nldyn.orbits.orbit import Orbit, stroboscopic
 
@@ -139,7 +141,10 @@ def settle(
         np.full(len(states), "", dtype=object),
     )
     for row in range(len(states)):
-        _settle_one(flow, omega, targets, longest, found, row)
+        try:
+            _settle_one(flow, omega, targets, longest, found, row)
+        except ConvergenceError as error:
+            found.failures[row] = str(error)
     return found
 
 
@@ -148,18 +153,15 @@ def _settle_one(
 ) -> None:
     """Fill one row of what is found; see `settle`."""
     lingered = [0] * len(targets)
-    for before in range(0, longest, CHUNK):
-        moved = flow.strobe(found.ends[row], omega, CHUNK)
-        if moved.failure:
-            found.failures[row] = moved.failure
-            return
-        found.ends[row] = moved.ends[-1]
-        found.periods[row] = before + CHUNK
+    for run in settling_runs(flow, found.ends[row], omega, longest, CHUNK):
+        before = int(found.periods[row])
+        found.ends[row] = run[-1]
+        found.periods[row] = before + len(run)
         for index, target in enumerate(targets):
-            near = target.reached(moved.ends)
+            near = target.reached(run)
             hits = np.flatnonzero(near != UNDECIDED)
             if target.shapes is None:
-                lingered[index] = lingered[index] + CHUNK if len(hits) == CHUNK else 0
+                lingered[index] = lingered[index] + len(run) if len(hits) == len(run) else 0
                 if lingered[index] >= LINGERS:
                     found.labels[row] = index
                     return

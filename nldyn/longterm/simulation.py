@@ -23,6 +23,7 @@ from nldyn.base.errors import (
 )
 from nldyn.flow.flow_map import FlowMap, Trajectory, flow_of
 from nldyn.flow.rigid import behind_rigid_stops, rest_forces
+from nldyn.flow.settling import periods_at_once, settling_runs
 from nldyn.orbits.history import History
 from nldyn.orbits.newton import check_bounded
 from nldyn.orbits.orbit import Orbit, check_observe, history_of
@@ -499,21 +500,15 @@ def transient_end(
     ConvergenceError
         If it cannot be simulated.
     """
-    at_once = periods_at_once(flow, PIECE)
-    for done in range(0, periods, at_once):
-        count = min(periods - done, at_once)
-        found = flow.at(omega, done * 2.0 * math.pi / omega).strobe(state, omega, count)
-        if found.failure:
-            hz = omega / (2.0 * math.pi)
-            raise ConvergenceError(f"the transient at {hz:g} Hz failed: {found.failure}")
-        state = found.ends[-1]
-        tell(done + count)
+    done = 0
+    try:
+        for run in settling_runs(flow, state, omega, periods, PIECE):
+            state, done = run[-1], done + len(run)
+            tell(done)
+    except ConvergenceError as error:
+        hz = omega / (2.0 * math.pi)
+        raise ConvergenceError(f"the transient at {hz:g} Hz failed: {error}") from None
     return state
-
-
-def periods_at_once(flow: FlowMap, most: int) -> int:
-    """How many periods one flow map serves: one where forces have frequencies of their own."""
-    return 1 if flow.system.tones else most
 
 
 def _blocks(

@@ -72,9 +72,9 @@ class Axis:
             If there is no such parameter, it cannot have these values, or the frequency is given
             where it changes or missing where it does not.
         """
-        chosen = checked_parameter(system, FREQUENCY if parameter is None else parameter)
-        name = parameter_name(chosen)
-        if moves_frequency(chosen):
+        chart = chart_over(system, limits, parameter)
+        name = parameter_name(chart.parameter)
+        if moves_frequency(chart.parameter):
             if frequency_hz is not None:
                 raise SystemModelError(
                     f"frequency_hz is what parameter '{name}' changes: give it with another one"
@@ -85,7 +85,7 @@ class Axis:
             )
         else:
             check_frequency("frequency_hz", frequency_hz)
-        return cls(Chart.of(chosen, limits), frequency_hz)
+        return cls(chart, frequency_hz)
 
     @classmethod
     def in_frequency(cls, limits: tuple[float, float]) -> Axis:

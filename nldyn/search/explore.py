@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import (
+    ConvergenceError,
     KeptWorkError,
     SystemModelError,
     check_types,
@@ -24,6 +25,7 @@ from nldyn.branches.branch import Branch
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.flow.settling import settling_runs
 from nldyn.orbits.axis import Axis, Section
 from nldyn.orbits.deflation import deflated_orbit
 from nldyn.orbits.orbit import Orbit, check_observe, same_orbit, stroboscopic
@@ -54,7 +56,8 @@ NEAR = 0.1  # a return within this share of the motion is worth a Newton iterati
 ARRIVED = 0.01  # a motion this near to a known orbit, relative, has settled on it or passes it
 CANDIDATES = 5  # near returns of each motion and period from which Newton's method starts
 TRANSIENT = 5  # periods of a motion beside which no orbits are looked for
-PIECE = 16  # periods simulated between two looks at the known orbits; later a quarter of all
+PIECE = 16  # periods simulated between two looks at the known orbits
+LATER = 0.25  # of all before, where that is more
 LIKELY_ROUNDS = 2  # after which, mostly, a round has found nothing new
 AGAIN = 12  # times that a frequency is searched again while its indices say that orbits are missing
 NEAR_ORBIT = 1e-4  # of a run's size: from its end to the orbit on which it lies
@@ -382,21 +385,20 @@ class _Survey:
         It ends as soon as it comes near to one; no states if it cannot be computed.
         """
         here = known.here
-        settling = settling_periods(here.flow.system, here.frequency_hz)
-        settling = min(settling, self.effort.settling)
-        left = settling + math.ceil(RETURNS * self.max_period) + 1
+        waited = settling_periods(here.flow.system, here.frequency_hz)
+        waited = min(waited, self.effort.settling)
+        most = waited + math.ceil(RETURNS * self.max_period) + 1
         states = np.array([start])
-        while left > 0:
-            self.box.tell("search", here.value)
-            count = min(left, max(PIECE, len(states) // 4))
-            found = here.flow.strobe(states[-1], here.omega, count)
-            if found.failure:
-                return None, None
-            states = np.vstack([states, found.ends])
-            orbit = known.stable_near(states[-PIECE:])
-            if orbit is not None:
-                return states, orbit
-            left -= count
+        self.box.tell("search", here.value)
+        try:
+            for run in settling_runs(here.flow, start, here.omega, most, PIECE, LATER):
+                self.box.tell("search", here.value)
+                states = np.vstack([states, run])
+                orbit = known.stable_near(states[-PIECE:])
+                if orbit is not None:
+                    return states, orbit
+        except ConvergenceError:
+            return None, None
         return states, None
 
     def _settled_on(self, run: Real, here: Section, known: Sequence[Orbit]) -> Orbit | None:
