@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import numbers
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
@@ -13,16 +12,19 @@ from typing import Literal, get_args
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import SystemModelError, check_choice, check_range, check_types, check_whole
+from nldyn.base.errors import SystemModelError, check_choice, check_types, check_whole
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.longterm.attractors import Attractor, AttractorOptions, Kind, attractor_from
 from nldyn.longterm.impacts import check_stop, impacts
 from nldyn.longterm.simulation import Motion
+from nldyn.orbits.axis import Axis
 from nldyn.orbits.newton import check_bounded
 from nldyn.orbits.orbit import check_observe
 from nldyn.orbits.starts import random_states
 from nldyn.runtime.executors import check_execution, values_of
 from nldyn.runtime.progress import of_number, shows_progress
+from nldyn.system.chart import THE_FREQUENCY, value_of
+from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
 Direction = Literal["up", "down", "random"]
@@ -77,12 +79,12 @@ def impact_section(motion: Motion, stop: int = 0) -> tuple[Real, Real]:
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """What a motion has settled on at one frequency.
+    """What a motion has settled on at one frequency, or value of another parameter.
 
     Parameters
     ----------
     direction : {"up", "down", "random"}
-        Whether the start is the attractor of the frequency below, above, or a random state.
+        Whether the start is the attractor of the value below, above, or a random state.
     attractor : Attractor
         The attractor.
     peaks : (k,)
@@ -117,45 +119,62 @@ class BruteForce:
         Interface whose displacement is shown.
     columns : tuple of Column
         Those of the sweep up, of the sweep down, then from random states.
+    parameter : Parameter
+        What changes from column to column.
     """
 
     observe: str
     columns: tuple[Column, ...]
+    parameter: Parameter = THE_FREQUENCY
 
-    def ranges(self, kind: Kind = "chaotic") -> list[tuple[float, float]]:
-        """Ranges of neighbouring frequencies (Hz) with an attractor of a kind in any column.
+    @property
+    def values(self) -> list[float]:
+        """Value of the parameter of each column, Hz of the frequency."""
+        return [
+            value_of(c.attractor.flow.system, c.frequency_hz, self.parameter) for c in self.columns
+        ]
 
-        They begin and end half way to the neighbouring frequencies without one, and a single
-        frequency counts, too.
-        """
+    def _with_kind(self, kind: Kind) -> dict[float, bool]:
+        """Whether there is an attractor of a kind at each value, ascending."""
         check_choice("kind", kind, get_args(Kind))
-        frequencies = sorted({column.frequency_hz for column in self.columns})
-        with_kind = {c.frequency_hz for c in self.columns if c.attractor.kind == kind}
-        found: list[tuple[float, float]] = []
-        open_range = False
-        for index, hz in enumerate(frequencies):
-            if hz in with_kind:
-                low = 0.5 * (frequencies[max(index - 1, 0)] + hz)
-                high = 0.5 * (frequencies[min(index + 1, len(frequencies) - 1)] + hz)
-                found = [*found[:-1], (found[-1][0], high)] if open_range else [*found, (low, high)]
-            open_range = hz in with_kind
+        found = dict.fromkeys(sorted(self.values), False)
+        for value, column in zip(self.values, self.columns, strict=True):
+            found[value] = found[value] or column.attractor.kind == kind
         return found
 
-    def share(self, low_hz: float, high_hz: float, kind: Kind = "chaotic") -> tuple[int, int]:
-        """At how many frequencies from `low_hz` to `high_hz` a kind was found, and of how many."""
-        check_choice("kind", kind, get_args(Kind))
-        for name, hz in (("low_hz", low_hz), ("high_hz", high_hz)):
-            check_types(**{name: (hz, numbers.Real)})
-        inside = [c for c in self.columns if low_hz <= c.frequency_hz <= high_hz]
-        with_kind = {c.frequency_hz for c in inside if c.attractor.kind == kind}
-        return len(with_kind), len({c.frequency_hz for c in inside})
+    def ranges(self, kind: Kind = "chaotic") -> list[tuple[float, float]]:
+        """Ranges of neighbouring values with an attractor of a kind in any column.
+
+        They begin and end half way to the neighbouring values without one, and a single
+        value counts, too.
+        """
+        with_kind = self._with_kind(kind)
+        values = list(with_kind)
+        found: list[tuple[float, float]] = []
+        open_range = False
+        for index, (value, here) in enumerate(with_kind.items()):
+            if here:
+                low = 0.5 * (values[max(index - 1, 0)] + value)
+                high = 0.5 * (values[min(index + 1, len(values) - 1)] + value)
+                found = [*found[:-1], (found[-1][0], high)] if open_range else [*found, (low, high)]
+            open_range = here
+        return found
+
+    def share(self, low: float, high: float, kind: Kind = "chaotic") -> tuple[int, int]:
+        """At how many values from `low` to `high` a kind was found, and of how many."""
+        for name, end in (("low", low), ("high", high)):
+            check_types(**{name: (end, numbers.Real)})
+        inside = [here for value, here in self._with_kind(kind).items() if low <= value <= high]
+        return sum(inside), len(inside)
 
 
 @shows_progress(of_number("motions"))
 def brute_force(
     system: System | FlowMap,
-    range_hz: tuple[float, float],
+    limits: tuple[float, float],
     *,
+    parameter: str | Parameter | None = None,
+    frequency_hz: float | None = None,
     points: int = 200,
     directions: Sequence[Direction] = ("up", "down"),
     starts: int = 0,
@@ -166,24 +185,26 @@ def brute_force(
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> BruteForce:
-    """Simulate and classify the attractors over a range of frequencies.
+    """Simulate and classify the attractors over a range of frequencies, or another parameter.
 
-    A sweep goes from frequency to frequency and starts from the attractor before, so that up and
+    A sweep goes from value to value and starts from the attractor before, so that up and
     down differ where attractors coexist. Each direction is one computation, and so are the random
-    starts of every eight frequencies.
+    starts of every eight values. A start that would lie behind a rigid stop begins at it.
 
     Parameters
     ----------
     system : System or FlowMap
         What to simulate.
-    range_hz : (float, float)
-        Frequencies in Hz, ascending.
+    limits : (float, float)
+        Frequencies in Hz, or values of the parameter, ascending.
+    parameter, frequency_hz
+        As for `nldyn.diagram`: what changes, and the excitation frequency where that is held.
     points : int
-        Number of frequencies, equally spaced.
+        Number of values, equally spaced.
     directions : sequence of {"up", "down"}
         Sweeps.
     starts : int
-        Random initial states at each frequency.
+        Random initial states at each value.
     recorded : int
         Excitation periods recorded on each attractor.
     observe : str, optional
@@ -218,11 +239,14 @@ def brute_force(
     >>> found = brute_force(system, (35.0, 40.0), points=6, directions=["up"])
     >>> found.columns[1].attractor.kind  # at 36 Hz
     'chaotic'
+    >>> over = brute_force(system, (1e-6, 1e-4), parameter="gap", frequency_hz=36.0, points=2)
+    >>> [column.attractor.name for column in over.columns], over.values[:2]
+    (['period 4', 'period 1', 'period 1', 'period 4'], [1e-06, 0.0001])
     """
     flow = flow_of(system)
     check_types(directions=(directions, Sequence), options=(options, AttractorOptions, None))
     check_execution(executor, progress)
-    low, high = check_range(range_hz)
+    axis = Axis.of(flow.system, limits, parameter, frequency_hz)
     check_whole("points", points, 1, MOST_POINTS)
     check_whole("starts", starts, 0, MOST_POINTS)
     check_whole("recorded", recorded, 1, MOST_POINTS)
@@ -232,38 +256,41 @@ def brute_force(
         check_choice("directions", direction, ("up", "down"))
     if not directions and not starts:
         raise SystemModelError("brute_force needs a direction or random starts")
-    frequencies = np.linspace(low, high, points).tolist()
-    for hz in frequencies:
-        check_bounded(flow, 2.0 * math.pi * hz)
+    values = np.linspace(*axis.limits, points).tolist()
+    for value in values:
+        here = axis.at(flow, value)
+        check_bounded(here.flow, here.omega)
     tasks: list[tuple[Direction, list[float]]] = [
-        (direction, frequencies if direction == "up" else frequencies[::-1])
-        for direction in directions
+        (direction, values if direction == "up" else values[::-1]) for direction in directions
     ]
     if starts:
-        tasks += [("random", frequencies[k : k + 8]) for k in range(0, points, 8)]
-    task = partial(_columns, flow, name, options or AttractorOptions(), recorded, starts, seed)
+        tasks += [("random", values[k : k + 8]) for k in range(0, points, 8)]
+    effort = options or AttractorOptions()
+    task = partial(_columns, flow, axis, name, effort, recorded, starts, seed)
     found = values_of(task, tasks, executor, progress)
-    return BruteForce(name, tuple(column for columns in found for column in columns))
+    columns = tuple(column for columns in found for column in columns)
+    return BruteForce(name, columns, axis.parameter)
 
 
 def _columns(
-    flow: FlowMap, observe: str, options: AttractorOptions, recorded: int, starts: int, seed: int,
-    task: tuple[Direction, list[float]],
+    flow: FlowMap, axis: Axis, observe: str, options: AttractorOptions, recorded: int, starts: int,
+    seed: int, task: tuple[Direction, list[float]],
 ) -> list[Column]:  # fmt: skip
     """Columns of one sweep, or from random states."""
-    direction, frequencies = task
+    direction, values = task
     columns = []
     state = np.zeros(2 * flow.system.size)
-    for hz in frequencies:
+    for value in values:
+        here = axis.at(flow, value)
         if direction == "random":
-            fresh = random_states(flow, 2.0 * math.pi * hz, starts + 1, seed)[1:]
+            fresh = random_states(here.flow, here.omega, starts + 1, seed)[1:]
         else:
-            fresh = state[None]
+            fresh = here.taken_over(state[None])
         for start in fresh:
-            attractor = attractor_from(flow, hz, observe, options, start)
+            attractor = attractor_from(here.flow, here.frequency_hz, observe, options, start)
             columns.append(column_of(direction, attractor, observe, recorded))
             failed = attractor.kind == "failed"
-            state = np.zeros_like(state) if failed else attractor.states[-1]
+            state = np.zeros_like(state) if failed else here.to_base(attractor.states[-1])
     return columns
 
 

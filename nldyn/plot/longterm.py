@@ -27,14 +27,16 @@ from nldyn.plot.diagram import (
     STABLE,
     UNSTABLE,
     draw_legend,
+    followed,
     length_unit,
     new_axes,
     period_colours,
     plot_diagram,
     stability_runs,
 )
-from nldyn.plot.words import LENGTHS, axis_unit, direction_of, displacement_of, units_of
+from nldyn.plot.words import LENGTHS, Along, axis_unit, direction_of, displacement_of, units_of
 from nldyn.search.diagram import Diagram
+from nldyn.system.chart import parameter_name
 
 KIND_COLOURS = {
     "periodic": "#222222",
@@ -115,7 +117,7 @@ def plot_brute_force(
     diagram: Diagram | Iterable[Branch] | None = None,
     unit: str | None = None,
 ) -> Axes:
-    """Draw what motions settle on against frequency, over the branches if they are given.
+    """Draw what motions settle on against what changes, over the branches if they are given.
 
     The peak or the stroboscopic displacement of a periodic motion lies on the line of its branch;
     a motion of period n shows up to n values. Ranges with chaotic motions are shaded.
@@ -148,6 +150,7 @@ def plot_brute_force(
     if unit is not None:
         check_choice("unit", unit, UNITS)
     branches = _branches_of(found, quantity, diagram)
+    along = followed(branches) if branches else _along(found)
     sizes = [np.abs(_values(c, quantity)).max(initial=0.0) for c in found.columns]
     factor, name = length_unit(float(max(sizes, default=1.0)))
     if quantity == "impact phase":
@@ -158,17 +161,24 @@ def plot_brute_force(
     if branches and quantity == "peak":
         plot_diagram(branches, ax, special_points=(), unit=name, references=False)
     elif branches:
-        _draw_strobes(ax, branches, found.observe, factor)
-    shade_ranges(ax, found.ranges())
-    handles = _draw_columns(ax, found, quantity, factor)
+        _draw_strobes(ax, branches, found.observe, along, factor)
+    shade_ranges(ax, [(a / along.factor, b / along.factor) for a, b in found.ranges()])
+    handles = _draw_columns(ax, found, quantity, along, factor)
     before = ax.get_legend()
     if before is not None:
         handles = [*before.legend_handles, *handles]
     ax.legend(handles=handles, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
-    ax.set_xlabel("excitation frequency (Hz)")
+    ax.set_xlabel(along.label)
     ending = "/s" if quantity == "impact speed" else ""
     ax.set_ylabel(f"{QUANTITIES[quantity].format(found.observe)} ({name}{ending})")
     return ax
+
+
+def _along(found: BruteForce) -> Along:
+    """How the values of columns are told."""
+    largest = float(np.abs(found.values).max(initial=0.0))
+    system = found.columns[0].attractor.flow.system if found.columns else None
+    return Along.of(found.parameter, largest, system)
 
 
 def _branches_of(
@@ -182,6 +192,11 @@ def _branches_of(
     branches = list(diagram.branches if isinstance(diagram, Diagram) else diagram)
     check_branches("diagram", branches)
     for branch in branches:
+        if branch.parameter != found.parameter:
+            followed, changed = map(parameter_name, (branch.parameter, found.parameter))
+            raise SystemModelError(
+                f"diagram: a branch was followed in {followed}, the motions differ in {changed}"
+            )
         observed = branch.nodes[0].orbit.observe
         if quantity == "peak" and observed != found.observe:
             raise SystemModelError(
@@ -190,17 +205,19 @@ def _branches_of(
     return branches
 
 
-def _draw_columns(ax: Axes, found: BruteForce, quantity: str, factor: float) -> list[Any]:
+def _draw_columns(
+    ax: Axes, found: BruteForce, quantity: str, along: Along, factor: float
+) -> list[Any]:
     """Draw the values of all columns, and give the entries of the legend."""
     handles: list[Any] = []
+    places = np.array(found.values) / along.factor
     for kind, colour in KIND_COLOURS.items():
-        chosen = [c for c in found.columns if c.attractor.kind == kind]
+        chosen = [k for k, c in enumerate(found.columns) if c.attractor.kind == kind]
         if chosen:
-            values = [_values(c, quantity) for c in chosen]
-            hz = np.repeat([c.frequency_hz for c in chosen], [v.size for v in values])
-            ax.plot(
-                hz, np.concatenate(values) / factor, ".", markersize=1.2, color=colour, zorder=3
-            )
+            values = [_values(found.columns[k], quantity) for k in chosen]
+            x = np.repeat(places[chosen], [v.size for v in values])
+            y = np.concatenate(values) / factor
+            ax.plot(x, y, ".", markersize=1.2, color=colour, zorder=3)
             handles.append(
                 Line2D([], [], marker=".", linestyle="none", color=colour, label=f"{kind} motion")
             )
@@ -216,9 +233,10 @@ def _values(column: Column, quantity: str) -> Real:
 
 
 def strobe_curves(branch: Branch, interface: str) -> tuple[Real, Real, NDArray[np.bool_]]:
-    """Frequencies (k,), displacements (k, n) at forcing phase zero, and stability of a branch.
+    """Values (k,), displacements (k, n) at forcing phase zero, and stability of a branch.
 
-    A branch of period n has n values at each of its points.
+    The values are those of what changes along it, Hz for the frequency. A branch of period n has n
+    displacements at each of its points.
     """
     orbits = branch.points
     name = check_observe(orbits[0].system, interface)
@@ -228,26 +246,28 @@ def strobe_curves(branch: Branch, interface: str) -> tuple[Real, Real, NDArray[n
         phases = np.zeros(len(modal))
         values.append(orbit.system.displacement(name, modal, phases, orbit.omega)[0])
     stable = np.array([orbit.stable for orbit in orbits], dtype=bool)
-    return branch.frequency_hz, np.array(values), stable
+    return branch.values, np.array(values), stable
 
 
-def _draw_strobes(ax: Axes, branches: Sequence[Branch], interface: str, factor: float) -> None:
+def _draw_strobes(
+    ax: Axes, branches: Sequence[Branch], interface: str, along: Along, factor: float
+) -> None:
     """Draw the stroboscopic displacements of branches in the style of a diagram."""
     colours = period_colours(branch.period for branch in branches)
     for branch in branches:
-        hz, values, stable = strobe_curves(branch, interface)
+        places, values, stable = strobe_curves(branch, interface)
         for run in stability_runs(stable):
             part = slice(run.start, run.stop)
             style = STABLE if run.stable else UNSTABLE
             ax.plot(
-                hz[part], values[part] / factor, color=colours[branch.period], linewidth=1.4,
-                linestyle=style,
+                places[part] / along.factor, values[part] / factor,
+                color=colours[branch.period], linewidth=1.4, linestyle=style,
             )  # fmt: skip
     draw_legend(ax, colours, branches, {})
 
 
 def shade_ranges(ax: Axes, ranges: Sequence[tuple[float, float]], colour: str = SHADE) -> None:
-    """Shade ranges of frequencies, below everything else."""
+    """Shade ranges of what changes, below everything else."""
     for low, high in ranges:
         ax.axvspan(low, high, color=colour, alpha=0.6, linewidth=0.0, zorder=0)
 

@@ -94,7 +94,7 @@ CALLS = {  # with the types that can be used
     ),
     "quantity": (lambda g, value: power_spectrum(g["motion"], quantity=value), ()),
     "kind": (lambda g, value: g["diagram"].ranges(value), ()),
-    "low_hz": (lambda g, value: g["diagram"].share(value, 90.0), (int, float)),
+    "low": (lambda g, value: g["diagram"].share(value, 90.0), (int, float)),
     "index": (lambda g, value: g["basins"].points(value), ()),
     "modal": (lambda g, value: g["plane"].coordinates(value), ()),
     "orbit": (lambda g, value: stable_manifold(value, g["plane"]), ()),
