@@ -17,7 +17,7 @@ FILES = [path for package in PACKAGES for path in sorted((ROOT / package).rglob(
 ONLY_POSIX = {"fcntl", "grp", "posix", "pty", "pwd", "resource", "syslog", "termios", "tty"}
 HIDE = """
 import os, signal, sys
-import h5py, imageio, matplotlib, meshio, multiprocessing.pool, plotly, pydantic, pyvista
+import h5py, imageio, matplotlib, multiprocessing.pool, plotly, pydantic, pyvista
 import scipy, skfem, subprocess, tempfile, threadpoolctl
 
 for name in {modules}:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import meshio
-
+from fem.formats.content import MeshContent
 from fem.mesh.attachments import Attachments, LeftOut
 
 
@@ -32,7 +31,7 @@ class DeckFile:
         What of the names to ignore was met, in capitals and without blanks and asterisk.
     """
 
-    content: meshio.Mesh
+    content: MeshContent
     attachments: Attachments = field(default_factory=Attachments)
     described: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     left_out: tuple[LeftOut, ...] = ()

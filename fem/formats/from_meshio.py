@@ -1,18 +1,17 @@
-"""Meshes of frames and structures from those of meshio."""
+"""Meshes of frames and structures from those of files and of meshio."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from typing import TypeVar
 
-import meshio
 import numpy as np
 from numpy.typing import ArrayLike
 
-import fem.formats.meshio_kinds  # noqa: F401  (completes meshio's tables)
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError, quoted
 from fem.formats.collapsed import uncollapsed
+from fem.formats.content import MeshLike, dimension_of
 from fem.formats.ignored import SET_PREFIX, TYPE_PREFIX
 from fem.mesh.cells import KINDS, SPANS
 from fem.mesh.frame_mesh import FrameMesh
@@ -23,7 +22,7 @@ FARTHEST = 1e50
 ASIDE = 1e-6  # of its length: how far the middle node of a straight line may lie beside it
 
 
-def from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> FrameMesh:
+def from_meshio(content: MeshLike, source: str = "meshio mesh") -> FrameMesh:
     """Take lines, parts and points out of a `meshio.Mesh`; see `read_mesh` for the conventions.
 
     Examples
@@ -55,7 +54,7 @@ def from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> FrameMesh:
     )
 
 
-def structure_from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> StructureMesh:
+def structure_from_meshio(content: MeshLike, source: str = "meshio mesh") -> StructureMesh:
     """Take cells, groups and points of all kinds out of a `meshio.Mesh`.
 
     Examples
@@ -110,7 +109,7 @@ def structure_from_meshio(content: meshio.Mesh, source: str = "meshio mesh") -> 
     )
 
 
-def _check_kinds(content: meshio.Mesh, taken: set[str], source: str, advice: str) -> None:
+def _check_kinds(content: MeshLike, taken: set[str], source: str, advice: str) -> None:
     """Refuse cells that would be left out, by their kinds, blocks and groups."""
     found: dict[str, list[int]] = {}
     for index, block in enumerate(content.cells):
@@ -121,7 +120,7 @@ def _check_kinds(content: meshio.Mesh, taken: set[str], source: str, advice: str
     told = []
     for kind, blocks in found.items():
         count = sum(len(content.cells[index].data) for index in blocks)
-        dimension = content.cells[blocks[0]].dim
+        dimension = dimension_of(kind)
         names = {n for i in blocks for n, at in _groups(content, i, dimension, source) if len(at)}
         group = f"in {quoted(sorted(names))}" if names else "in no group"
         number = ", ".join(map(str, blocks[:5])) + (", ..." if len(blocks) > 5 else "")
@@ -161,14 +160,14 @@ def _check_nodes(what: str, nodes: IntArray, count: int, source: str) -> None:
         raise ModelError(f"{source}: {what} {bad[0]} (counted from 0) has a node that is not there")
 
 
-def _three_coordinates(content: meshio.Mesh, source: str) -> FloatArray:
+def _three_coordinates(content: MeshLike, source: str) -> FloatArray:
     points = np.asarray(content.points, dtype=np.float64)
     if points.ndim != 2 or not 1 <= points.shape[1] <= 3:
         raise ModelError(f"{source}: the mesh is empty (no points)")
     return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
 
 
-def _lines_and_parts(content: meshio.Mesh, source: str) -> tuple[IntArray, dict[str, IntArray]]:
+def _lines_and_parts(content: MeshLike, source: str) -> tuple[IntArray, dict[str, IntArray]]:
     curved = sorted({b.type for b in content.cells if b.type.startswith("line")} - set(SPANS))
     if curved:
         raise ModelError(
@@ -196,7 +195,7 @@ def _lines_and_parts(content: meshio.Mesh, source: str) -> tuple[IntArray, dict[
     return np.concatenate(lines), {name: np.concatenate(p) for name, p in parts.items()}
 
 
-def straight_pieces(content: meshio.Mesh, kind: str, cells: ArrayLike, source: str) -> IntArray:
+def straight_pieces(content: MeshLike, kind: str, cells: ArrayLike, source: str) -> IntArray:
     """Two-node lines (e, 2) of lines with two or three nodes; a curved one is refused."""
     nodes = np.asarray(cells, dtype=np.int64)
     _check_nodes(kind, nodes, len(content.points), source)
@@ -216,7 +215,7 @@ def straight_pieces(content: meshio.Mesh, kind: str, cells: ArrayLike, source: s
     return np.stack([nodes[:, list(ends)] for ends in SPANS[kind]], axis=1).reshape(-1, 2)
 
 
-def _point_sets(content: meshio.Mesh, source: str) -> dict[str, IntArray]:
+def _point_sets(content: MeshLike, source: str) -> dict[str, IntArray]:
     sets: dict[str, list[IntArray]] = {}
     for name, nodes in content.point_sets.items():
         sets.setdefault(str(name), []).append(np.asarray(nodes, dtype=np.int64))
@@ -243,7 +242,7 @@ def _marked(array: str, values: ArrayLike, source: str) -> IntArray:
 
 
 def _groups(
-    content: meshio.Mesh, index: int, dimension: int, source: str
+    content: MeshLike, index: int, dimension: int, source: str
 ) -> Iterator[tuple[str, IntArray]]:
     """Names and cell indices of all groups in one block of cells."""
     for name, blocks in content.cell_sets.items():
@@ -257,7 +256,7 @@ def _groups(
         yield _physical_name(content, int(tag), dimension), np.flatnonzero(tags == tag)
 
 
-def _physical_name(content: meshio.Mesh, tag: int, dimension: int) -> str:
+def _physical_name(content: MeshLike, tag: int, dimension: int) -> str:
     for name, (number, its_dimension) in content.field_data.items():
         if (number, its_dimension) == (tag, dimension):
             return str(name)

@@ -1,9 +1,9 @@
 """Read Gmsh files of versions 2.2 and 4.1, ASCII and binary.
 
-meshio 5.3 has a reader of its own, but it takes what a damaged file says: a node that is not there
-counts from the end of the list, an element with a number too many or too few gets other nodes, and
-a declared number of nodes is allocated before the first one is read. This one refuses these, and
-the result is the same `meshio.Mesh`. Physical groups are cell sets.
+The reader of meshio takes what a damaged file says: a node that is not there counts from the end of
+the list, an element with a number too many or too few gets other nodes, and a declared number of
+nodes is allocated before the first one is read. This one refuses these. Physical groups are cell
+sets.
 """
 
 from __future__ import annotations
@@ -13,17 +13,22 @@ import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import meshio
 import numpy as np
-from meshio._common import num_nodes_per_cell
-from meshio.gmsh.common import _gmsh_to_meshio_type
 
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
+from fem.formats.content import CellBlock, MeshContent, dimension_of
 
 VERSIONS = {"2": "2.2", "2.2": "2.2", "4.1": "4.1"}  # Gmsh writes 4 for 4.0
-_DIMENSIONS = {"vert": 0, "line": 1, "tria": 2, "quad": 2}  # by the beginning of a kind's name
-DIMENSION = {kind: _DIMENSIONS.get(kind[:4], 3) for kind in _gmsh_to_meshio_type.values()}
+TYPES = {
+    1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4), 4: ("tetra", 4), 5: ("hexahedron", 8),
+    6: ("wedge", 6), 7: ("pyramid", 5), 8: ("line3", 3), 9: ("triangle6", 6), 10: ("quad9", 9),
+    11: ("tetra10", 10), 12: ("hexahedron27", 27), 13: ("wedge18", 18), 14: ("pyramid14", 14),
+    15: ("vertex", 1), 16: ("quad8", 8), 17: ("hexahedron20", 20), 18: ("wedge15", 15),
+    19: ("pyramid13", 13),
+}  # fmt: skip
+"""Kinds of cells and their numbers of nodes by Gmsh's numbers, up to the second order."""
+NODE_COUNTS = dict(TYPES.values())
 NODES = {
     "tetra10": (*range(8), 9, 8),
     "pyramid13": (*range(5), 5, 8, 10, 6, 7, 9, 11, 12),
@@ -36,7 +41,7 @@ NODES = {
         *(22, 23, 21, 24, 20, 25, 26),
     ),
 }
-"""Where Gmsh has the nodes of a cell in VTK's order; meshio 5.3 leaves out two of the kinds."""
+"""Where Gmsh has the nodes of a cell in VTK's order."""
 Groups = dict[tuple[int, int], IntArray]
 DIMENSION_NAMES = ("point", "curve", "surface", "volume")
 WITHOUT_CELLS = ("Comments", "GhostElements", "Periodic", "Parametrizations", "NodeData",
@@ -110,7 +115,7 @@ class _Block:
     entities: IntArray | None = None  # (e,), of version 2.2
 
 
-def read_gmsh(path: Path) -> meshio.Mesh:
+def read_gmsh(path: Path) -> MeshContent:
     """Read the nodes, elements and physical groups of a Gmsh file.
 
     Parameters
@@ -120,7 +125,7 @@ def read_gmsh(path: Path) -> meshio.Mesh:
 
     Returns
     -------
-    meshio.Mesh
+    MeshContent
         One block of cells for each entity (4.1) or run of elements of one type (2.2), and the
         physical groups as cell sets; a group without a name goes by its number.
 
@@ -150,7 +155,7 @@ def read_gmsh(path: Path) -> meshio.Mesh:
     return _mesh(content)
 
 
-def _mesh(content: bytes) -> meshio.Mesh:
+def _mesh(content: bytes) -> MeshContent:
     sections = _sections(content)
     version, binary, size_type = _header(sections["MeshFormat"])
     unknown = sorted(set(sections) - {*READ, *WITHOUT_CELLS})
@@ -180,11 +185,11 @@ def _mesh(content: bytes) -> meshio.Mesh:
     if (np.diff(labels[order]) == 0).any():
         raise ValueError("two nodes have the same number")
     cells = [
-        (block.kind, _in_order_of_vtk(block.kind, _positions(block.nodes, labels, order)))
+        CellBlock(block.kind, _in_order_of_vtk(block.kind, _positions(block.nodes, labels, order)))
         for block in blocks
     ]
     names = _names(sections.get("PhysicalNames", b"0"))
-    return meshio.Mesh(points, cells, cell_sets=_cell_sets(blocks, names))
+    return MeshContent(points, cells, cell_sets=_cell_sets(blocks, names))
 
 
 def _cell_sets(
@@ -195,7 +200,7 @@ def _cell_sets(
     named = _apart(blocks, names)
     for number, block in enumerate(blocks):
         for group in np.unique(block.groups[block.groups != 0]):
-            name = named[DIMENSION[block.kind], int(group)]
+            name = named[dimension_of(block.kind), int(group)]
             empty = [np.zeros(0, dtype=np.int64)] * len(blocks)
             found = np.flatnonzero((block.groups == group).any(axis=1))
             of_blocks = sets.setdefault(name, empty)
@@ -209,7 +214,7 @@ def _apart(blocks: list[_Block], names: dict[tuple[int, int], str]) -> dict[tupl
     A point set and one group of cells may share a name, since a mesh keeps them apart.
     """
     used = {
-        (DIMENSION[block.kind], int(group))
+        (dimension_of(block.kind), int(group))
         for block in blocks
         for group in np.unique(block.groups[block.groups != 0])
     }
@@ -383,7 +388,7 @@ def _lines_22(body: bytes) -> list[_Block]:
     for line in lines:
         label, code, tags, *rest = (_whole(word) for word in line.split())
         kind = _kind(code)
-        if tags < 0 or len(rest) != tags + num_nodes_per_cell[kind]:
+        if tags < 0 or len(rest) != tags + NODE_COUNTS[kind]:
             raise ValueError(f"element {label} does not have the numbers of its type")
         if not runs or runs[-1][0] != kind:
             runs.append((kind, [], [], [], []))
@@ -410,7 +415,7 @@ def _binary_22(numbers: _Numbers) -> list[_Block]:
         kind = _kind(code)
         if here < 1 or tags < 0:
             raise ValueError("a block of elements is empty")
-        width = 1 + tags + num_nodes_per_cell[kind]
+        width = 1 + tags + NODE_COUNTS[kind]
         rows = numbers.integers(here * width).reshape(here, width)
         groups = np.abs(rows[:, 1:2]) if tags else np.zeros((here, 1), dtype=np.int64)
         entities = rows[:, 2] if tags > 1 else np.zeros(here, dtype=np.int64)
@@ -478,7 +483,7 @@ def _elements_41(numbers: _Numbers, groups: Groups) -> list[_Block]:
     for _ in range(blocks):
         dimension, tag, code = numbers.integers(3).tolist()
         kind, here = _kind(code), int(numbers.sizes(1)[0])
-        width = 1 + num_nodes_per_cell[kind]
+        width = 1 + NODE_COUNTS[kind]
         rows = numbers.sizes(here * width).reshape(here, width)
         of_entity = groups.get((dimension, tag), np.zeros(0, dtype=np.int64))
         found.append(_Block(kind, rows[:, 1:], np.tile(of_entity, (here, 1)), rows[:, 0]))
@@ -489,9 +494,12 @@ def _elements_41(numbers: _Numbers, groups: Groups) -> list[_Block]:
 
 
 def _kind(code: int) -> str:
-    if code not in _gmsh_to_meshio_type:
-        raise ValueError(f"an element has the type {code}, which is not read")
-    return str(_gmsh_to_meshio_type[code])
+    if code not in TYPES:
+        raise ValueError(
+            f"an element has the type {code}, which is not read; cells of the first and second"
+            " order are"
+        )
+    return TYPES[code][0]
 
 
 def _in_order_of_vtk(kind: str, nodes: IntArray) -> IntArray:

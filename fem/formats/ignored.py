@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-import meshio
 import numpy as np
 from numpy.typing import NDArray
 
 from fem.base.arrays import IntArray
 from fem.base.errors import ModelError, quoted
+from fem.formats.content import CellBlock, MeshContent
 
 UNGROUPED = "ungrouped"
 """Stands for the cells that are in no group."""
@@ -22,14 +22,14 @@ Mask = NDArray[np.bool_]
 
 
 def without_cells(
-    content: meshio.Mesh, names: Iterable[str], source: str
-) -> tuple[meshio.Mesh, list[str]]:
+    content: MeshContent, names: Iterable[str], source: str
+) -> tuple[MeshContent, list[str]]:
     """A mesh without some of its cells, and a sentence for each name on what was left out.
 
     Parameters
     ----------
     content
-        The mesh, as meshio has it.
+        The mesh of the file.
     names
         Of groups, of kinds of cells such as "quad", of element types of Abaqus such as "S4R", or
         "ungrouped" for the cells that are in no group.
@@ -43,7 +43,10 @@ def without_cells(
 
     Examples
     --------
-    >>> content = meshio.Mesh(np.eye(3), [("line", [[0, 1]]), ("triangle", [[0, 1, 2]])])
+    >>> content = MeshContent(
+    ...     np.eye(3),
+    ...     [CellBlock("line", np.array([[0, 1]])), CellBlock("triangle", np.array([[0, 1, 2]]))],
+    ... )
     >>> left, said = without_cells(content, ["triangle"], "mesh")
     >>> [block.type for block in left.cells], said
     (['line'], ['1 triangle left out, as "triangle" is to be ignored'])
@@ -67,7 +70,7 @@ def without_cells(
     return (_kept(content, keep) if said else content), said
 
 
-def _known(content: meshio.Mesh) -> list[str]:
+def _known(content: MeshContent) -> list[str]:
     """Names of groups and types that hold cells."""
     sets = [name for name, blocks in content.cell_sets.items() if any(len(at) for at in blocks)]
     names = [str(name).removeprefix(TYPE_PREFIX) for name in sets]
@@ -75,7 +78,7 @@ def _known(content: meshio.Mesh) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _masks(content: meshio.Mesh, name: str) -> Iterator[Mask]:
+def _masks(content: MeshContent, name: str) -> Iterator[Mask]:
     """For each block which of its cells a name stands for."""
     for index, block in enumerate(content.cells):
         mask = np.full(len(block.data), block.type == name)
@@ -91,7 +94,7 @@ def _masks(content: meshio.Mesh, name: str) -> Iterator[Mask]:
         yield mask
 
 
-def _named(content: meshio.Mesh, index: int) -> Iterator[tuple[str, IntArray]]:
+def _named(content: MeshContent, index: int) -> Iterator[tuple[str, IntArray]]:
     for name, blocks in content.cell_sets.items():
         if index < len(blocks):
             cells = np.asarray(blocks[index], dtype=np.int64)
@@ -103,7 +106,7 @@ def _named(content: meshio.Mesh, index: int) -> Iterator[tuple[str, IntArray]]:
             yield name.removeprefix(SET_PREFIX), np.flatnonzero(np.asarray(blocks[index]).ravel())
 
 
-def _kept(content: meshio.Mesh, keep: list[Mask]) -> meshio.Mesh:
+def _kept(content: MeshContent, keep: list[Mask]) -> MeshContent:
     """The mesh with the cells that are kept, and their sets and data."""
     stays = [i for i, mask in enumerate(keep) if mask.any()]
     number = [np.cumsum(mask) - 1 for mask in keep]
@@ -112,9 +115,9 @@ def _kept(content: meshio.Mesh, keep: list[Mask]) -> meshio.Mesh:
         cells = np.asarray(cells, dtype=np.int64)
         return np.asarray(number[i][cells[keep[i][cells]]], dtype=np.int64)
 
-    return meshio.Mesh(
+    return MeshContent(
         content.points,
-        [(content.cells[i].type, content.cells[i].data[keep[i]]) for i in stays],
+        [CellBlock(content.cells[i].type, content.cells[i].data[keep[i]]) for i in stays],
         point_data=content.point_data,
         cell_data={
             n: [np.asarray(d[i])[keep[i]] for i in stays] for n, d in content.cell_data.items()
@@ -122,4 +125,5 @@ def _kept(content: meshio.Mesh, keep: list[Mask]) -> meshio.Mesh:
         field_data=content.field_data,
         point_sets=content.point_sets,
         cell_sets={n: [in_block(i, s[i]) for i in stays] for n, s in content.cell_sets.items()},
+        unit=content.unit,
     )

@@ -1,7 +1,7 @@
 """Read MED files, as Salome and Code_Aster have them, with the names of their groups.
 
-meshio 5.3 has a reader of its own, but it cannot hold cells of which some kinds are in a group and
-others in none, which is how these programs write them, and keeps the families, not the groups.
+meshio cannot hold cells of which some kinds are in a group and others in none, which is how these
+programs write them, and keeps the families, not the groups.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import meshio
 import numpy as np
 
 from fem.base.arrays import IntArray
 from fem.base.errors import ModelError, quoted
+from fem.formats.content import CellBlock, MeshContent
 
 KINDS = {
     "PO1": "vertex", "SE2": "line", "SE3": "line3", "TR3": "triangle", "TR6": "triangle6",
@@ -35,7 +35,7 @@ UNKNOWN = ("", "INCONNUE", "SANS UNITE", "UNKNOWN")
 """What stands where no unit is known."""
 
 
-def read_med(path: Path) -> meshio.Mesh:
+def read_med(path: Path) -> MeshContent:
     """Read the nodes, cells and groups of a MED file with one mesh.
 
     Parameters
@@ -45,9 +45,9 @@ def read_med(path: Path) -> meshio.Mesh:
 
     Returns
     -------
-    meshio.Mesh
+    MeshContent
         One block for each kind of cell; groups of cells as cell sets, groups of nodes as point
-        sets. Its ``info`` is the unit that the file states, or empty.
+        sets. Its ``unit`` is what the file states, or empty.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def read_med(path: Path) -> meshio.Mesh:
         step = mesh if "NOE" in mesh else _only_step(path, mesh)
         families = file["FAS"][names[0]] if "FAS" in file and names[0] in file["FAS"] else {}
         content = _content(path, step, families, int(mesh.attrs["ESP"]))
-        content.info = _stated_unit(mesh)
+        content.unit = _stated_unit(mesh)
         return content
 
 
@@ -121,7 +121,7 @@ def _only_step(path: Path, mesh: Any) -> Any:
     return next(iter(mesh.values()))
 
 
-def _content(path: Path, step: Any, families: Any, dimension: int) -> meshio.Mesh:
+def _content(path: Path, step: Any, families: Any, dimension: int) -> MeshContent:
     coordinates = step["NOE"]["COO"][()]
     points = coordinates.reshape((dimension, -1)).T
     others = [name for name in step if name not in ("NOE", "MAI")]
@@ -134,7 +134,7 @@ def _content(path: Path, step: Any, families: Any, dimension: int) -> meshio.Mes
     cells, numbers = [], []
     for name, group in step.get("MAI", {}).items():
         count = _count(group)
-        cells.append((KINDS[name], group["NOD"][()].reshape(-1, count).T - 1))
+        cells.append(CellBlock(KINDS[name], group["NOD"][()].reshape(-1, count).T - 1))
         numbers.append(_family_numbers(path, group, name, count, families, "ELEME"))
     sets: dict[str, list[IntArray]] = {}
     for number, family in _groups(families, "ELEME"):
@@ -147,7 +147,7 @@ def _content(path: Path, step: Any, families: Any, dimension: int) -> meshio.Mes
     for number, family in _groups(families, "NOEUD"):
         marked = np.flatnonzero(nodes == number)
         point_sets[family] = np.union1d(point_sets.get(family, marked), marked)
-    return meshio.Mesh(np.ascontiguousarray(points), cells, cell_sets=sets, point_sets=point_sets)
+    return MeshContent(np.ascontiguousarray(points), cells, cell_sets=sets, point_sets=point_sets)
 
 
 def _family_numbers(

@@ -7,12 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-import meshio
-
-import fem.formats.meshio_kinds  # noqa: F401  (completes meshio's tables)
 from fem.base.errors import ModelError, quoted
 from fem.formats.abaqus import read_abaqus
 from fem.formats.abaqus.deck import bare
+from fem.formats.content import MeshContent
 from fem.formats.deck_file import DeckFile
 from fem.formats.faults import reason_of
 from fem.formats.from_meshio import from_meshio, structure_from_meshio
@@ -21,14 +19,15 @@ from fem.formats.ignored import without_cells
 from fem.formats.med import read_med
 from fem.formats.nastran import read_nastran
 from fem.formats.unv import read_unv
-from fem.formats.vtk import read_vtk, read_vtu
+from fem.formats.vtk_legacy import read_vtk
+from fem.formats.vtu import read_vtu
 from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.structure_mesh import StructureMesh
 
 Mesh = TypeVar("Mesh", FrameMesh, StructureMesh)
 
 
-READERS: dict[str, tuple[str, Callable[[Path], meshio.Mesh]]] = {
+READERS: dict[str, tuple[str, Callable[[Path], MeshContent]]] = {
     ".msh": ("Gmsh", read_gmsh),
     ".vtu": ("VTK", read_vtu),
     ".vtk": ("VTK", read_vtk),
@@ -132,7 +131,7 @@ def read_structure(
 
 def _read(
     path: str | Path,
-    build: Callable[[meshio.Mesh, str], Mesh],
+    build: Callable[[MeshContent, str], Mesh],
     include_folders: Iterable[str | Path],
     ignore: Sequence[str],
 ) -> Mesh:
@@ -164,7 +163,7 @@ def _read(
             read_unv(path) if extension == UNIVERSAL else (READERS[extension][1](path), [])
         )
         content, said = without_cells(whole, ignore, str(path))
-        mesh = _noted(_with_unit(build(content, str(path)), whole.info), said)
+        mesh = _noted(_with_unit(build(content, str(path)), whole.unit), said)
         return replace(mesh, left_out=left_out)
     except ModelError:
         raise
@@ -178,7 +177,7 @@ def _read(
 
 def _deck_mesh(
     path: Path,
-    build: Callable[[meshio.Mesh, str], Mesh],
+    build: Callable[[MeshContent, str], Mesh],
     include_folders: Iterable[str | Path],
     ignore: Sequence[str],
 ) -> Mesh:
@@ -190,7 +189,7 @@ def _deck_mesh(
 
 def _with_attached(
     path: Path,
-    build: Callable[[meshio.Mesh, str], Mesh],
+    build: Callable[[MeshContent, str], Mesh],
     found: DeckFile,
     ignore: Sequence[str],
 ) -> Mesh:
@@ -205,9 +204,9 @@ def _with_attached(
     )
 
 
-def _with_unit(mesh: Mesh, unit: str | None) -> Mesh:
+def _with_unit(mesh: Mesh, unit: str) -> Mesh:
     """A mesh with the unit that its file states."""
-    if unit in (None, "", "m"):
+    if unit in ("", "m"):
         return mesh
     note = (
         f"{mesh.source}: states the unit {unit!r} for its coordinates, which are taken as they are,"

@@ -6,12 +6,12 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import meshio
 import numpy as np
 
 from fem.base.arrays import IntArray
 from fem.base.errors import ModelError
 from fem.formats.abaqus.keywords import decoded
+from fem.formats.content import CellBlock, MeshContent
 from fem.mesh.attachments import LeftOut
 from fem.mesh.cells import KINDS as CELLS
 
@@ -84,7 +84,7 @@ class Elements:
     unread: dict[str, list[int]] = field(default_factory=dict)
 
 
-def read_unv(path: Path) -> tuple[meshio.Mesh, list[LeftOut]]:
+def read_unv(path: Path) -> tuple[MeshContent, list[LeftOut]]:
     """Read the nodes, elements and groups of a universal file.
 
     Parameters
@@ -147,7 +147,7 @@ def read_unv(path: Path) -> tuple[meshio.Mesh, list[LeftOut]]:
         for number, labels in sorted(elements.properties.items()):
             groups.append((f"property {number}", [(ELEMENT, label) for label in labels]))
     content = _content(path, points, elements.cells, groups)
-    content.info = unit
+    content.unit = unit
     return content, [*left, *_left_out(elements)]
 
 
@@ -246,14 +246,14 @@ def _content(
     points: dict[int, list[float]],
     cells: dict[str, dict[int, list[int]]],
     groups: list[tuple[str, list[tuple[int, int]]]],
-) -> meshio.Mesh:
+) -> MeshContent:
     place = {label: at for at, label in enumerate(points)}
     used = (node for of_kind in cells.values() for nodes in of_kind.values() for node in nodes)
     missing = next((node for node in used if node not in place), None)
     if missing is not None:
         raise ModelError(f"{path}: an element has the node {missing}, which is not defined")
     blocks = [
-        (kind, np.array([[place[node] for node in nodes] for nodes in of_kind.values()]))
+        CellBlock(kind, np.array([[place[n] for n in nodes] for nodes in of_kind.values()]))
         for kind, of_kind in cells.items()
     ]
     where = [{label: at for at, label in enumerate(of_kind)} for of_kind in cells.values()]
@@ -279,6 +279,6 @@ def _content(
             cell_sets[name] = [np.array([at[n] for n in elements if n in at]) for at in where]
         if nodes:
             point_sets[name] = np.unique(nodes)
-    return meshio.Mesh(
+    return MeshContent(
         np.array(list(points.values())), blocks, point_sets=point_sets, cell_sets=cell_sets
     )

@@ -6,16 +6,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 
-import meshio
 import numpy as np
 import numpy.typing as npt
-from meshio._vtk_common import meshio_to_vtk_type
 
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError, quoted
 from fem.base.files import plain_write_errors
 from fem.formats.abaqus.types import ORDERS, SOLIDS
+from fem.formats.content import CellBlock
 from fem.formats.ignored import SET_PREFIX
+from fem.formats.vtu import write_vtu
 from fem.mesh.cells import KINDS
 from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.structure_mesh import StructureMesh
@@ -68,7 +68,7 @@ def write_mesh(mesh: FrameMesh | StructureMesh, path: str | Path) -> None:
         with plain_write_errors(path):
             structures[path.suffix.lower()](mesh, path)
         return
-    writers = {".msh": _write_gmsh, ".vtu": _write_vtu, ".inp": _write_abaqus}
+    writers = {".msh": _write_gmsh, ".vtu": _write_frame, ".inp": _write_abaqus}
     if path.suffix.lower() not in writers:
         raise ModelError(
             f"{path}: unknown mesh extension {path.suffix!r}; known are {quoted(writers)}"
@@ -78,80 +78,65 @@ def write_mesh(mesh: FrameMesh | StructureMesh, path: str | Path) -> None:
 
 
 def _write_gmsh(mesh: FrameMesh, path: Path) -> None:
-    part_tags = np.zeros(len(mesh.lines), dtype=np.int64)
-    groups: dict[str, IntArray] = {}
+    """Version 2.2, ASCII: elements of one physical group each, and vertices for the points."""
+    tags = np.zeros(len(mesh.lines), dtype=np.int64)
+    names: list[tuple[int, str]] = []
     for tag, (name, elements) in enumerate(mesh.parts.items(), start=1):
-        if part_tags[elements].any():
+        if tags[elements].any():
             raise ModelError(f"{path}: part {name!r} overlaps another, which Gmsh 2.2 cannot say")
-        part_tags[elements] = tag
-        groups[name] = np.array([tag, 1])
-    vertices: list[int] = []
-    point_tags: list[int] = []
-    for tag, (name, nodes) in enumerate(mesh.point_sets.items(), start=len(groups) + 1):
-        if name in groups:
+        tags[elements] = tag
+        names.append((1, name))
+    cells = [(1, tag, ends) for tag, ends in zip(tags.tolist(), mesh.lines.tolist(), strict=True)]
+    for tag, (name, nodes) in enumerate(mesh.point_sets.items(), start=len(names) + 1):
+        if name in mesh.parts:
             raise ModelError(f"{path}: {name!r} names both a part and a point")
-        vertices.extend(nodes.tolist())
-        point_tags.extend([tag] * len(nodes))
-        groups[name] = np.array([tag, 0])
-    cells = [("line", mesh.lines)]
-    tags = [part_tags]
-    if vertices:
-        cells.append(("vertex", np.array(vertices).reshape(-1, 1)))
-        tags.append(np.array(point_tags))
-    content = meshio.Mesh(
-        mesh.points,
-        cells,
-        cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
-        field_data=groups,
-    )
-    meshio.gmsh.write(path, content, fmt_version="2.2", binary=False)
+        cells += [(15, tag, [node]) for node in nodes.tolist()]
+        names.append((0, name))
+    points = enumerate(mesh.points.tolist(), start=1)
+    sections = {
+        "MeshFormat": ["2.2 0 8"],
+        "PhysicalNames": [str(len(names))]
+        + [f'{size} {tag} "{name}"' for tag, (size, name) in enumerate(names, start=1)],
+        "Nodes": [str(len(mesh.points)), *(f"{i} {x!r} {y!r} {z!r}" for i, (x, y, z) in points)],
+        "Elements": [str(len(cells))]
+        + [
+            " ".join(map(str, (label, code, 2, tag, tag, *(node + 1 for node in nodes))))
+            for label, (code, tag, nodes) in enumerate(cells, start=1)
+        ],
+    }
+    rows = [f"${name}\n" + "\n".join(body) + f"\n$End{name}\n" for name, body in sections.items()]
+    path.write_text("".join(rows), encoding="utf-8")
 
 
-def _write_vtu(mesh: FrameMesh, path: Path) -> None:
-    content = meshio.Mesh(
-        mesh.points,
-        [("line", mesh.lines)],
-        cell_data={
-            SET_PREFIX + name: [_indicator(elements, len(mesh.lines))]
-            for name, elements in mesh.parts.items()
-        },
-        point_data={
-            SET_PREFIX + name: _indicator(nodes, len(mesh.points))
-            for name, nodes in mesh.point_sets.items()
-        },
-    )
-    meshio.vtu.write(path, content)
+def _write_frame(mesh: FrameMesh, path: Path) -> None:
+    marks = {
+        SET_PREFIX + name: _flags(elements, len(mesh.lines))
+        for name, elements in mesh.parts.items()
+    }
+    write_vtu(path, mesh.points, [CellBlock("line", mesh.lines)], _marked_points(mesh), marks)
 
 
 def _write_structure(mesh: StructureMesh, path: Path) -> None:
-    """Compressed; coordinates in double precision."""
-    for kind in mesh.cells:
-        if kind not in meshio_to_vtk_type:
-            raise ModelError(f"{path}: VTK has no cells of kind {kind!r}")
-    content = meshio.Mesh(
-        mesh.points,
-        list(mesh.cells.items()),
-        cell_data={
-            SET_PREFIX + name: [
-                _flags(group.get(kind, np.zeros(0, dtype=np.int64)), len(cells))
-                for kind, cells in mesh.cells.items()
-            ]
-            for name, group in mesh.groups.items()
-        },
-        point_data={
-            SET_PREFIX + name: _flags(nodes, len(mesh.points))
-            for name, nodes in mesh.point_sets.items()
-        },
-    )
-    meshio.vtu.write(path, content)
+    none = np.zeros(0, dtype=np.int64)
+    marks = {
+        SET_PREFIX + name: np.concatenate(
+            [_flags(group.get(kind, none), len(cells)) for kind, cells in mesh.cells.items()]
+        )
+        for name, group in mesh.groups.items()
+    }
+    blocks = [CellBlock(kind, cells) for kind, cells in mesh.cells.items()]
+    write_vtu(path, mesh.points, blocks, _marked_points(mesh), marks)
+
+
+def _marked_points(mesh: FrameMesh | StructureMesh) -> dict[str, npt.NDArray[np.int8]]:
+    return {
+        SET_PREFIX + name: _flags(nodes, len(mesh.points))
+        for name, nodes in mesh.point_sets.items()
+    }
 
 
 def _flags(indices: IntArray, count: int) -> npt.NDArray[np.int8]:
-    return _indicator(indices, count).astype(np.int8)
-
-
-def _indicator(indices: IntArray, count: int) -> IntArray:
-    values = np.zeros(count, dtype=np.int64)
+    values = np.zeros(count, dtype=np.int8)
     values[indices] = 1
     return values
 

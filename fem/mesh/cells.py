@@ -1,4 +1,4 @@
-"""Kinds of cells: shape functions and quadrature in the node order of meshio and VTK."""
+"""Kinds of cells: shape functions and quadrature in VTK's order of nodes."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class CellKind:
     Parameters
     ----------
     name
-        meshio's name, such as "hexahedron20".
+        As meshio names it, such as "hexahedron20".
     element
         scikit-fem's element of the same shape functions, or a `NodalElement`.
     order
@@ -148,7 +148,7 @@ class CellKind:
 
     @cached_property
     def nodes(self) -> FloatArray:
-        """Places of all nodes in the reference cell, in meshio's order, shape (b, d)."""
+        """Places of all nodes in the reference cell, in VTK's order, shape (b, d)."""
         return self.filled(self.corners)
 
     def filled(self, corners: FloatArray) -> FloatArray:

@@ -31,7 +31,7 @@ class StructureMesh:
         Coordinates in m, shape (n, 3). Points on no cell may be points to which faces are
         coupled; the others do no harm.
     cells
-        Node indices (e, b) by meshio's name of the kind of cell, in meshio's (VTK's) order.
+        Node indices (e, b) by the kind of cell, such as "hexahedron20", in VTK's order.
     groups
         Cells by name: for each kind, indices into its array. A model names those that are its
         parts; the others name places, such as the triangles of a face.

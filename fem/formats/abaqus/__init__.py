@@ -51,7 +51,7 @@ def read_abaqus(
     Returns
     -------
     DeckFile
-        The mesh as meshio has it, and what is attached to it.
+        The points, cells and names, and what is attached to it.
 
     Raises
     ------

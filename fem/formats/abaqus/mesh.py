@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import meshio
 import numpy as np
 
 from fem.base.arrays import FloatArray, IntArray
@@ -14,6 +13,7 @@ from fem.formats.abaqus.keywords import Keyword
 from fem.formats.abaqus.sets import Resolver
 from fem.formats.abaqus.surfaces import Surfaces
 from fem.formats.abaqus.types import ORDERS
+from fem.formats.content import CellBlock, MeshContent
 from fem.formats.ignored import TYPE_PREFIX
 
 OFF_FACE = 0.3  # of a cell's size: farther off, a node is not the one of its place in the row
@@ -131,8 +131,8 @@ def content_of(
     position: dict[Label, int],
     places: dict[Label, FloatArray],
     surfaces: Surfaces,
-) -> meshio.Mesh:
-    """The mesh as meshio has it."""
+) -> MeshContent:
+    """Points, cells and names."""
     kinds = list(cells.nodes)
     blocks = [(kind, np.array(nodes, dtype=np.int64)) for kind, nodes in cells.nodes.items()]
     points = np.array(list(places.values()), dtype=np.float64).reshape(-1, 3)
@@ -149,7 +149,8 @@ def content_of(
         name: np.unique(np.array([position[label] for label in labels], dtype=np.int64))
         for name, labels in nodes.items()
     }
-    return meshio.Mesh(points, blocks, point_sets=point_sets, cell_sets=cell_sets)
+    cells_of = [CellBlock(kind, nodes) for kind, nodes in blocks]
+    return MeshContent(points, cells_of, point_sets=point_sets, cell_sets=cell_sets)
 
 
 def _by_kind(kinds: list[str], cells: Cells, labels: list[Label]) -> list[IntArray]:

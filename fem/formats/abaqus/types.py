@@ -24,7 +24,7 @@ SHELLS |= {"S9R5": "quad9", "M3D9": "quad9"}
 """Shells and membranes by the kind of their cells."""
 
 ORDERS = {"line3": (0, 2, 1), "hexahedron27": (*range(20), 26, 24, 23, 25, 21, 22, 20)}
-"""Where meshio's nodes are among those of the file, for kinds whose order is another.
+"""Where VTK's nodes are among those of the file, for kinds whose order is another.
 
 A line of three nodes has the middle one second in the file; a C3D27 has its centre before its
 faces, and these in the order of the faces' numbers.

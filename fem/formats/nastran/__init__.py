@@ -44,7 +44,7 @@ def read_nastran(
     Returns
     -------
     DeckFile
-        The mesh as meshio has it, and what is attached to it.
+        The points, cells and names, and what is attached to it.
 
     Raises
     ------

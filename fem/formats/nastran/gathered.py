@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-import meshio
 import numpy as np
 
 from fem.base.arrays import FloatArray
+from fem.formats.content import CellBlock, MeshContent
 from fem.formats.ignored import TYPE_PREFIX
 from fem.formats.nastran.cards import Card
 from fem.formats.nastran.deck import DIRECTIONS, Deck
@@ -161,15 +161,16 @@ class Gathered:
         words += filter(None, [self.deck.control.first("AUTOSPC")])
         return words[-1:] not in (["NO"], ["N"])
 
-    def content(self) -> meshio.Mesh:
-        """The mesh as meshio has it."""
+    def content(self) -> MeshContent:
+        """Points, cells and names."""
         numbers = [*self.deck.grids, *self.deck.scalars]
         place = {number: i for i, number in enumerate(numbers)}
         points = [self.deck.places[number] for number in self.deck.grids]
         points += [np.zeros(3)] * len(self.deck.scalars)
         kinds = list(self.cells)
         blocks = [
-            (kind, np.array([[place[n] for n in c] for c in self.cells[kind]])) for kind in kinds
+            CellBlock(kind, np.array([[place[n] for n in c] for c in self.cells[kind]]))
+            for kind in kinds
         ]
         named = {**self.groups, **{TYPE_PREFIX + n: g for n, g in self.types.items()}}
         sets = {
@@ -180,4 +181,4 @@ class Gathered:
             name: np.unique(np.array([place[grid] for grid in grids], dtype=np.int64))
             for name, grids in self.sets.items()
         }
-        return meshio.Mesh(np.array(points), blocks, point_sets=point_sets, cell_sets=sets)
+        return MeshContent(np.array(points), blocks, point_sets=point_sets, cell_sets=sets)

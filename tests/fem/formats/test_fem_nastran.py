@@ -159,12 +159,15 @@ def test_included_files_are_read_and_errors_name_them(tmp_path):
     assert told[0].startswith("INCLUDE of executive control (1, first in line 2): it holds no bulk")
 
 
+UNKNOWN = ("pyramid13", "wedge15")  # to meshio
+
+
 @pytest.mark.filterwarnings("ignore::fem.LockingWarning")
 @pytest.mark.parametrize("form", ["fixed-small", "fixed-large", "free"])
 @pytest.mark.parametrize("family", ["first order", "serendipity"])
 def test_meshio_writes_the_same_solids(tmp_path, family, form):
     mesh, path = mixed_block(family, lambda corners: 0.5 * corners), tmp_path / "block.bdf"
-    cells = {kind: nodes for kind, nodes in mesh.cells.items() if kind != "pyramid13"}
+    cells = {kind: nodes for kind, nodes in mesh.cells.items() if kind not in UNKNOWN}
     ones = [np.ones(len(nodes), dtype=int) for nodes in cells.values()]
     content = meshio.Mesh(mesh.points, list(cells.items()), cell_data={"nastran:ref": ones})
     meshio.nastran.write(path, content, point_format=form, cell_format="fixed-small")

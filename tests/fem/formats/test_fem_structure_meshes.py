@@ -316,15 +316,15 @@ def test_a_plane_frame_refuses_what_only_a_structure_has():
 
 
 def test_cells_of_an_unknown_kind_are_told_and_not_dropped():
-    """One of 24 nodes among others, by kind, count, group and block."""
+    """One of 64 nodes among others, by kind, count, group and block."""
     block = fem.box_mesh("block", (1.0, 1.0, 1.0), (2, 1, 1), kind="hexahedron27")
     cells = block.cells["hexahedron27"]
     content = meshio.Mesh(
         block.points,
-        [("hexahedron27", cells[:1]), ("hexahedron24", cells[1:, :24])],
+        [("hexahedron27", cells[:1]), ("hexahedron64", np.resize(cells[1:], (1, 64)))],
         cell_data={"set:block": [[1], [1]]},
     )
-    with pytest.raises(fem.ModelError, match=r"not read: 1 hexahedron24 \(in 'block'; block 1 of"):
+    with pytest.raises(fem.ModelError, match=r"not read: 1 hexahedron64 \(in 'block'; block 1 of"):
         fem.structure_from_meshio(content)
     content = meshio.Mesh(np.zeros((4, 3)), [("vertex", [[0], [1]])])
     with pytest.raises(fem.ModelError, match=r"no cells \(it has 4 nodes and 2 vertices\)"):
