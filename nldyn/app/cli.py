@@ -563,9 +563,21 @@ def simulate(
     return Told([*_shown(found.motion, hits, found.spectrum), written_by(out, "simulation")])
 
 
+def one_frequency_or_several_values(frequency_hz: float | None, over: int | None, **_: Any) -> None:
+    """Refuse one frequency beside several values, and neither."""
+    if (frequency_hz is None) == (over is None):
+        raise click.UsageError("needs either '--frequency-hz' or '--over'")
+
+
 @main.command()
-@writes_results()
-@frequency_option("Excitation frequency.")
+@writes_results(check=one_frequency_or_several_values)
+@frequency_option("Excitation frequency.", required=False)
+@click.option(
+    "--over",
+    type=click.IntRange(2, 10_000),
+    metavar="N",
+    help="Instead: N values of what [continuation] changes, equally spaced over its range.",
+)
 @click.option(
     "--x",
     callback=plane_state,
@@ -606,7 +618,8 @@ def simulate(
 @jobs_option
 def basins(
     work: Work,
-    frequency_hz: float,
+    frequency_hz: float | None,
+    over: int | None,
     x: PlaneState | None,
     y: PlaneState | None,
     x_range: tuple[float, float] | None,
@@ -619,7 +632,8 @@ def basins(
 
     All else begins undeformed, at forcing phase zero. Writes attractors.csv, with the share of
     each, basins.csv, each state with the number of its attractor (0 undecided, -1 behind a rigid
-    stop), and a picture.
+    stop), and a picture. Over several values the tables begin with the value, and the picture shows
+    the shares.
     """
     from nldyn.report.basins import write_basins
     from nldyn.scene.basins import basins_of
@@ -631,8 +645,8 @@ def basins(
             fault = unknown_name(state[1], scene.interface_names, "an interface")
             raise click.BadParameter(fault, param_hint=option)
     found = basins_of(
-        scene, frequency_hz, x=x, y=y, x_range=x_range, y_range=y_range, cells=cells,
-        longest=longest, progress=work.line, jobs=jobs,
+        scene, frequency_hz, over=over or 1, x=x, y=y, x_range=x_range, y_range=y_range,
+        cells=cells, longest=longest, progress=work.line, jobs=jobs,
     )  # fmt: skip
     write_basins(found, out, scene.text, scene.title)
     return Told([*_shown(found), found.report(), written_by(out, "basins")])

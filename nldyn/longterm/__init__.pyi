@@ -3,6 +3,7 @@
 from nldyn.longterm.attractors import Attractor as Attractor
 from nldyn.longterm.attractors import AttractorOptions as AttractorOptions
 from nldyn.longterm.attractors import Attractors as Attractors
+from nldyn.longterm.basin_shares import basins_over as basins_over
 from nldyn.longterm.basins import Basins as Basins
 from nldyn.longterm.initial_states import state_with as state_with
 from nldyn.longterm.lifetimes import chaos_lifetime as chaos_lifetime

@@ -1,5 +1,6 @@
 """Pictures of results with matplotlib."""
 
+from nldyn.plot.basin_shares import plot_basins_over
 from nldyn.plot.curves import plot_curves
 from nldyn.plot.diagram import plot_diagram
 from nldyn.plot.longterm import (
@@ -15,6 +16,7 @@ from nldyn.plot.orbit import plot_contact_force, plot_history, plot_phase_portra
 
 __all__ = [
     "plot_basins",
+    "plot_basins_over",
     "plot_brute_force",
     "plot_contact_force",
     "plot_curves",

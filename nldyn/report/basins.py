@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from nldyn.longterm.basin_shares import BasinsOver
 from nldyn.longterm.basins import Basins
 from nldyn.longterm.neighbourhoods import UNDECIDED
+from nldyn.plot.basin_shares import plot_basins_over
 from nldyn.plot.diagram import file_axes, save_figure
 from nldyn.plot.longterm import plot_basins
 from nldyn.report.results import if_known, write_table
 from nldyn.runtime.result_directory import result_directory
 
+Located = tuple[tuple[float, ...], Basins]  # with the value of a parameter, if one changes
 COLUMNS = (
     "attractor", "name", "share", "share_uncertainty", "period", "impacts_per_period", "interface",
     "min_displacement_{unit}", "max_displacement_{unit}", "largest_exponent_per_s", "integrity",
@@ -19,8 +22,12 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def write_basins(found: Basins, directory: str | Path, text: str, title: str = "") -> Path:
+def write_basins(
+    found: Basins | BasinsOver, directory: str | Path, text: str, title: str = ""
+) -> Path:
     """Write ``attractors.csv``, ``basins.csv``, ``basins.png`` and ``.svg``, and the scene.
+
+    Over a parameter the tables begin with its value, and the picture shows the shares.
 
     Raises
     ------
@@ -28,16 +35,34 @@ def write_basins(found: Basins, directory: str | Path, text: str, title: str = "
         If the directory holds only other people's files or cannot be written.
     """
     with result_directory(directory, "basins") as folder:
-        names = [name.format(unit=found.unit) for name in COLUMNS]
-        write_table(folder / "attractors.csv", names, attractor_rows(found))
-        columns = (found.plane.x_label, found.plane.y_label, "attractor", "phase", "periods")
-        write_table(folder / "basins.csv", columns, cell_rows(found))
-        ax = plot_basins(found, file_axes(7.0, 5.5))
+        first: list[str] = []
+        maps: list[Located] = []
+        if isinstance(found, BasinsOver):
+            first = [found.column]
+            maps = [((v,), each) for v, each in zip(found.values, found.maps, strict=True)]
+            ax = plot_basins_over(found, file_axes())
+        else:
+            maps = [((), found)]
+            ax = plot_basins(found, file_axes(7.0, 5.5))
+        _, one = maps[0]
+        names = [*first, *(name.format(unit=one.unit) for name in COLUMNS)]
+        write_table(folder / "attractors.csv", names, _rows_at(maps, attractor_rows))
+        columns = (*first, one.plane.x_label, one.plane.y_label, "attractor", "phase", "periods")
+        write_table(folder / "basins.csv", columns, _rows_at(maps, cell_rows))
         if title:
             ax.set_title(f"{title}\n{ax.get_title()}")
         save_figure(ax, folder / "basins")
         (folder / "scene.toml").write_text(text, encoding="utf-8")
     return Path(directory)
+
+
+def _rows_at(
+    maps: Sequence[Located], rows_of: Callable[[Basins], Iterator[tuple[object, ...]]]
+) -> Iterator[tuple[object, ...]]:
+    """Give the rows of several maps, each with the value of the parameter if there is one."""
+    for value, each in maps:
+        for row in rows_of(each):
+            yield (*value, *row)
 
 
 def attractor_rows(found: Basins) -> Iterator[tuple[object, ...]]:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 
 from nldyn.base.errors import SystemModelError
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.options import FlowOptions
-from nldyn.longterm.attractors import find_attractors
+from nldyn.longterm.attractors import Attractor, find_attractors
+from nldyn.longterm.basin_shares import BasinsOver, values_over
 from nldyn.longterm.basins import MOTION, Basins, PlaneState, StatePlane, basins, check_has_basins
+from nldyn.orbits.axis import Axis
 from nldyn.orbits.orbit import check_observe
 from nldyn.runtime.executors import own_processes
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.scene.build import build_system
 from nldyn.scene.faults import told_as
+from nldyn.scene.followed import axis_of
+from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import Scene
 from nldyn.system.system import System
 
@@ -24,8 +29,9 @@ Range = tuple[float, float]
 
 def basins_of(
     scene: Scene,
-    frequency_hz: float,
+    frequency_hz: float | None = None,
     *,
+    over: int = 1,
     x: PlaneState | None = None,
     y: PlaneState | None = None,
     x_range: Range | None = None,
@@ -34,7 +40,7 @@ def basins_of(
     longest: int = 2000,
     progress: Progress | None = None,
     jobs: int = 1,
-) -> Basins:
+) -> Basins | BasinsOver:
     """Basins of attraction of a scene in a plane of two of its initial states.
 
     All else begins undeformed and without speed, at forcing phase zero.
@@ -42,9 +48,12 @@ def basins_of(
     Parameters
     ----------
     scene : Scene
-        It needs no continuation, whose `rtol` counts if there is one.
-    frequency_hz : float
-        Excitation frequency in Hz.
+        It needs no continuation unless that is what they are computed over; its `rtol` counts if
+        there is one.
+    frequency_hz : float, optional
+        Excitation frequency in Hz; over the range of the continuation unless given.
+    over : int
+        Number of values of the continuation's parameter, equally spaced.
     x, y : ({"displacement", "velocity"}, str), optional
         What is on either axis, of which interface: displacement and velocity of that of the first
         stop, or of the first one if there is no stop, unless given.
@@ -87,26 +96,64 @@ def basins_of(
     flow = FlowMap(build_system(scene), FlowOptions(table.rtol) if table else None)
     name = first_interface(flow.system)
     x, y = x or ("displacement", name), y or ("velocity", name)
-    sought = 0 if x_range and y_range else STARTS
-    shares = Shares(progress or silent, {
-        "attractors": MOTION * sought, "cells": MOTION * (STARTS + CHECKS) + cells**2
-    })  # fmt: skip
+    axis = None if frequency_hz is not None else _axis_of(scene, flow.system)
     with told_as(scene, (), SystemModelError), own_processes(jobs) as executor:
-        check_has_basins(flow, frequency_hz)
+        values = [] if axis is None else values_over(flow, axis, over)
+        cases = _cases(flow, axis, values, frequency_hz)
+        shares = Shares(progress or silent)
+        for k in range(len(cases)):
+            shares.weigh(f"cells {k}", MOTION * (STARTS + CHECKS) + cells**2)
         plane = StatePlane.spanned_by(flow.system, x, y, x_range or (-1.0, 1.0), y_range or (-1, 1))
-        known = []
-        if sought:
-            found = find_attractors(
-                flow, frequency_hz, starts=sought, executor=executor,
-                progress=shares.counted("attractors", "motions to attractors"),
-            )  # fmt: skip
-            known = [share.attractor for share in found if share.attractor.lasting]
-            plane = StatePlane.around(known, x, y, x_range=x_range, y_range=y_range)
-        return basins(
-            flow, frequency_hz, plane, shape=(cells, cells), attractors=known, starts=STARTS,
-            longest=longest, checks=CHECKS, executor=executor,
-            progress=_in_cells(shares.part("cells")),
-        )  # fmt: skip
+        known: list[list[Attractor]] = [[] for _ in cases]
+        if not (x_range and y_range):
+            known = _attractors(cases, shares, executor)
+            every = [attractor for each in known for attractor in each]
+            plane = StatePlane.around(every, x, y, x_range=x_range, y_range=y_range)
+        maps = [
+            basins(
+                here, hz, plane, shape=(cells, cells), attractors=known[k], starts=STARTS,
+                longest=longest, checks=CHECKS, executor=executor,
+                progress=_in_cells(shares.part(f"cells {k}")),
+            )
+            for k, (here, hz) in enumerate(cases)
+        ]  # fmt: skip
+    return maps[0] if axis is None else BasinsOver(axis, tuple(values), tuple(maps))
+
+
+def _cases(
+    flow: FlowMap, axis: Axis | None, values: Sequence[float], frequency_hz: float | None
+) -> list[tuple[FlowMap, float]]:
+    """Flow map and frequency in Hz of each plane, at which there are attractors."""
+    if axis is None:
+        assert frequency_hz is not None
+        check_has_basins(flow, frequency_hz)
+        return [(flow, frequency_hz)]
+    sections = [axis.at(flow, value) for value in values]
+    return [(here.flow, here.frequency_hz) for here in sections]
+
+
+def _attractors(
+    cases: Sequence[tuple[FlowMap, float]], shares: Shares, executor: Executor | None
+) -> list[list[Attractor]]:
+    """What motions from a few random states of each case come to."""
+    for k in range(len(cases)):
+        shares.weigh(f"attractors {k}", MOTION * STARTS)
+    found = [
+        find_attractors(
+            flow, hz, starts=STARTS, executor=executor,
+            progress=shares.counted(f"attractors {k}", "motions to attractors"),
+        )
+        for k, (flow, hz) in enumerate(cases)
+    ]  # fmt: skip
+    return [[share.attractor for share in each if share.attractor.lasting] for each in found]
+
+
+def _axis_of(scene: Scene, system: System) -> Axis:
+    """What the continuation of a scene changes."""
+    if scene.continuation is None:
+        fault = "is missing: it says over which parameter and range basins are computed"
+        raise scene_error(scene.file, ("continuation",), fault)
+    return axis_of(scene, system)
 
 
 def first_interface(system: System) -> str:

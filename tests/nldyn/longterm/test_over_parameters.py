@@ -7,15 +7,17 @@ from problems import make_one_dof
 from nldyn import (
     HarmonicForce,
     RigidStop,
+    StatePlane,
     Stop,
     System,
     SystemModelError,
     Unbalance,
+    basins,
     continue_branch,
     solve_orbit,
 )
-from nldyn.longterm import brute_force
-from nldyn.plot import plot_brute_force
+from nldyn.longterm import basins_over, brute_force
+from nldyn.plot import plot_basins_over, plot_brute_force
 
 HZ = 23.0
 
@@ -88,6 +90,26 @@ def test_a_gap_that_shrinks_leaves_no_motion_behind_the_stop():
     found = brute_force(system, (0.05, 1.0), parameter="gap", frequency_hz=0.2, points=3,
                         directions=["down"], recorded=2)  # fmt: skip
     assert [column.attractor.kind for column in found.columns] == ["periodic"] * 3
+
+
+def test_shares_over_the_gap_are_those_of_basins_at_each_gap(branch):
+    low, high = sorted(s.value for s in branch.special_points if s.kind == "LP")
+    plane = StatePlane.at_interface(one_mode(), (-2e-4, 0.0), (-0.05, 0.05))
+    over = basins_over(one_mode(), (0.0, 4e-5), plane, points=3, parameter="gap",
+                       frequency_hz=HZ, shape=(6, 6), checks=0)  # fmt: skip
+    assert over.values == (0.0, 2e-5, 4e-5)
+    shares = over.shares()
+    assert list(shares) == ["period 1, 1 impact", "period 1, no impacts"]
+    alone = basins(one_mode(2e-5), HZ, plane, shape=(6, 6), checks=0)
+    for basin in alone.basins:
+        assert shares[basin.attractor.title][1] == basin.share
+    assert 0.0 < low < 2e-5 < high < 4e-5  # beyond either fold there is one stable orbit
+    assert [shares["period 1, 1 impact"][k] for k in (0, 2)] == [1.0, 0.0]
+    assert sum(shares.values()) == pytest.approx(1.0)
+    ax = plot_basins_over(over)
+    assert ax.get_xlabel() == "gap (µm)"
+    np.testing.assert_allclose(ax.lines[0].get_xdata(), [0.0, 20.0, 40.0])
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), 100.0 * shares["period 1, 1 impact"])
 
 
 @pytest.mark.parametrize(

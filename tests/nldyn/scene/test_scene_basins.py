@@ -120,6 +120,45 @@ def test_states_behind_a_rigid_stop_do_not_count(tmp_path):
         assert cell["attractor"] == ("-1" if behind else "1")
 
 
+OVER = """
+[continuation]
+parameter = "excitation.0.amplitude"
+range = [1.0, 3.0]
+frequency_hz = 0.1
+"""
+
+
+def test_over_the_force_a_linear_motion_grows_with_it(tmp_path):
+    result = told(tmp_path, LINEAR + OVER, "--over", "3", "--cells", "2")
+    assert result.exit_code == 0, result.stderr
+    found = rows(tmp_path / "out" / "attractors.csv")
+    assert [float(row["amplitude"]) for row in found] == [1.0, 2.0, 3.0]
+    rate = 0.2 * np.pi
+    for row in found:
+        exact = float(row["amplitude"]) / abs(1.0 - rate**2 + 0.2j * rate)
+        assert float(row["max_displacement_m"]) == pytest.approx(exact, rel=1e-6)
+        assert float(row["share"]) == 1.0
+    cells = rows(tmp_path / "out" / "basins.csv")
+    assert len(cells) == 12
+    places = [float(cell["displacement of x (m)"]) for cell in cells]  # of the largest motion
+    assert max(places) == pytest.approx(0.5 * 2.0 * exact, rel=1e-4)
+    assert (tmp_path / "out" / "basins.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("text", "more", "fault"),
+    [
+        (LINEAR, ("--over", "3"), "continuation is missing: it says over which parameter"),
+        (LINEAR + OVER, (), "needs either '--frequency-hz' or '--over'"),
+        (LINEAR + OVER, (*HZ, "--over", "3"), "needs either '--frequency-hz' or '--over'"),
+    ],
+)
+def test_values_to_go_over_are_those_of_a_continuation(tmp_path, text, more, fault):
+    result = told(tmp_path, text, *more)
+    assert result.exit_code == 2 and fault in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
 @pytest.mark.parametrize(
     ("text", "more", "fault"),
     [
