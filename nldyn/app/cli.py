@@ -548,7 +548,6 @@ def simulate(
     """
     from nldyn.longterm.impacts import impacts
     from nldyn.report.simulation import write_simulation
-    from nldyn.scene.build import direction_at
     from nldyn.scene.simulation import simulation_of
 
     scene, out = work.scene, work.out
@@ -558,7 +557,7 @@ def simulate(
         progress=work.line.counted("periods" if to_hz is None else "steps"),
     )  # fmt: skip
     hits = impacts(found.motion)
-    along = direction_at(scene, found.motion.system.interfaces[0])
+    along = scene.direction_at(found.motion.system.interfaces[0])
     write_simulation(found.motion, hits, out, scene.text, scene.title, along)
     return Told([*_shown(found.motion, hits, found.spectrum), written_by(out, "simulation")])
 
@@ -640,10 +639,10 @@ def basins(
     from nldyn.scene.messages import unknown_name
 
     scene, out = work.scene, work.out
-    for option, state in (("'--x'", x), ("'--y'", y)):
+    for option, state in (("--x", x), ("--y", y)):
         if state is not None and state[1] not in scene.interface_names:
             fault = unknown_name(state[1], scene.interface_names, "an interface")
-            raise click.BadParameter(fault, param_hint=option)
+            raise click.UsageError(f"{fault} ({option})")
     found = basins_of(
         scene, frequency_hz, over=over or 1, x=x, y=y, x_range=x_range, y_range=y_range,
         cells=cells, longest=longest, progress=work.line, jobs=jobs,

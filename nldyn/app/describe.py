@@ -63,7 +63,7 @@ def describe_system(system: System, residual: int = 0) -> str:
         lines.append(f"of the rotation of {turning}: rad for m, N m for N")
     lines += [describe_stop(stop, system.unit(stop.at)) for stop in system.stops]
     lines += [describe_spring(spring, system.unit(spring.at)) for spring in system.springs]
-    lines += [describe_slider(slider) for slider in system.sliders]
+    lines += [describe_slider(slider, system.unit(slider.at)) for slider in system.sliders]
     if np.any(system.spring_stiffness):
         hz = ", ".join(f"{value:.6f}" for value in system.linear.frequencies_hz)
         lines.append(f"frequencies with the springs: {hz} Hz")
@@ -131,14 +131,17 @@ def describe_spring(spring: AnySpring, length: str = "m") -> str:
     return f"spring {where}: {', '.join(terms) or f'0 {unit}'}"
 
 
-def describe_slider(slider: Slider) -> str:
-    """Say in a line where something slides, and what presses it on."""
+def describe_slider(slider: Slider, length: str = "m") -> str:
+    """Say in a line where something slides, and what presses it on; of a rotation in rad."""
+    from nldyn.system.naming import moment_unit
+
     law = slider.friction
     where = f"at '{slider.at}'" + (f" against '{slider.against}'" if slider.against else "")
     told = f"friction {where}: coefficient {law.coefficient:.6g}"
     told += f", at rest {law.at_rest:.6g}" if law.adhesion else ""
-    told += f", base at {law.base_speed:.6g} m/s" if law.base_speed else ""
-    pressing = f"stop {slider.stop}" if slider.stop >= 0 else f"{slider.normal_force:.6g} N"
+    told += f", base at {law.base_speed:.6g} {length}/s" if law.base_speed else ""
+    force = f"{slider.normal_force:.6g} {moment_unit(length)}"
+    pressing = f"stop {slider.stop}" if slider.stop >= 0 else force
     return f"{told}, pressed on by {pressing}"
 
 
@@ -147,7 +150,7 @@ def _place(stop: AnyStop) -> str:
 
 
 def static_flexibility(system: System, interface: str) -> float:
-    """Displacement in m at an interface for a steady force of 1 N there; inf if nothing holds."""
+    """Displacement in m, or rad, at an interface for 1 N, or 1 N m, there; inf if nothing holds."""
     import numpy as np
 
     phi = system.participation[interface]
@@ -163,12 +166,14 @@ def static_flexibility(system: System, interface: str) -> float:
 
 def described_as_json(system: System) -> dict[str, object]:
     """Static flexibilities and stops of a system."""
+    flexibilities: dict[str, dict[str, float]] = {}
+    for name in system.interfaces:
+        key = f"static_flexibility_{'rad_per_n_m' if name in system.rotations else 'm_per_n'}"
+        flexibilities.setdefault(key, {})[name] = static_flexibility(system, name)
     return {
-        "static_flexibility_m_per_n": {
-            name: static_flexibility(system, name) for name in system.interfaces
-        },
+        **flexibilities,
         "stops": [describe_stop(stop, system.unit(stop.at)) for stop in system.stops],
-        "friction": [describe_slider(slider) for slider in system.sliders],
+        "friction": [describe_slider(slider, system.unit(slider.at)) for slider in system.sliders],
     }
 
 

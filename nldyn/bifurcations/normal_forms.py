@@ -606,7 +606,7 @@ def touching(orbit: Orbit) -> list[tuple[int, float, bool]]:
 
 
 def _stop_name(orbit: Orbit, index: int, phase: float) -> str:
-    return f"{stop_name(orbit.system.stops, index)} ({1e3 * phase / orbit.omega:.4g} ms)"
+    return f"{stop_name(orbit.system, index)} ({1e3 * phase / orbit.omega:.4g} ms)"
 
 
 def _stability_at_grazing(special: SpecialPoint, others: Sequence[SpecialPoint]) -> str:

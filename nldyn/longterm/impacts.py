@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.rigid import rigid_impacts
 from nldyn.longterm.simulation import Motion, end_state, motion_of
 from nldyn.orbits.orbit import Orbit
+from nldyn.system.naming import turned
 from nldyn.system.system import System
 
 if TYPE_CHECKING:
@@ -40,13 +41,6 @@ UNITS = {
     "work": "J",
     "loss": "J",
     "frequency_hz": "Hz",
-}
-OF_ROTATIONS = {
-    "speed": "rad/s",
-    "rebound_speed": "rad/s",
-    "penetration": "rad",
-    "peak_force": "N m",
-    "impulse": "N m s",
 }
 
 
@@ -114,7 +108,7 @@ class Impacts:
 
     def _most(self, kind: NDArray[np.bool_]) -> Iterator[str]:
         """The largest values of the impacts (k,) on rotations, or on none."""
-        units = UNITS | (OF_ROTATIONS if self.rotation[kind].any() else {})
+        units = units_where(UNITS, self.rotation[kind])
         rigid = np.isnan(self.peak_force)
         for name, among in (
             ("speed", kind), ("peak_force", kind & ~rigid), ("impulse", kind & rigid)
@@ -125,11 +119,7 @@ class Impacts:
     @property
     def units(self) -> dict[str, str]:
         """Unit of each column; of both kinds of stops both, that of displacements first."""
-        if not self.rotation.any():
-            return dict(UNITS)
-        if self.rotation.all():
-            return UNITS | OF_ROTATIONS
-        return UNITS | {name: f"{UNITS[name]} or {unit}" for name, unit in OF_ROTATIONS.items()}
+        return units_where(UNITS, self.rotation)
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """The columns by name; their units are in `units`."""
@@ -140,6 +130,22 @@ class Impacts:
         frame = optional("pandas", "to_pandas").DataFrame(self.columns())
         frame.attrs["units"] = self.units
         return frame
+
+
+def units_where(units: Mapping[str, str], rotation: NDArray[np.bool_]) -> dict[str, str]:
+    """Units of columns of which some rows (k,), all or none are of rotations.
+
+    Examples
+    --------
+    >>> [units_where({"speed": "m/s"}, np.array(rows)) for rows in ([False], [False, True])]
+    [{'speed': 'm/s'}, {'speed': 'm/s or rad/s'}]
+    """
+    if not rotation.any():
+        return dict(units)
+    kinds = {name: (unit, turned(unit)) for name, unit in units.items()}
+    if rotation.all():
+        return {name: unit for name, (_, unit) in kinds.items()}
+    return {name: " or ".join(dict.fromkeys(pair)) for name, pair in kinds.items()}
 
 
 def check_stop(system: System, stop: object) -> None:

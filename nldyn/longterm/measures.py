@@ -17,11 +17,12 @@ from nldyn.base.arrays import Complex, Real
 from nldyn.base.errors import SystemModelError, check_choice, check_types, check_whole
 from nldyn.branches.branch import Branch
 from nldyn.longterm.attractors import Attractor
-from nldyn.longterm.impacts import check_stop, impacts, panel_table
+from nldyn.longterm.impacts import check_stop, impacts, panel_table, units_where
 from nldyn.longterm.poincare import BruteForce
 from nldyn.longterm.simulation import MOST_RECORDED, WHOLE, Motion, motion_of
 from nldyn.orbits.harmonics import modal_row
-from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.history import told
+from nldyn.orbits.orbit import Orbit, check_observe
 from nldyn.runtime.executors import check_execution, values_of
 from nldyn.runtime.progress import of_number, shows_progress
 from nldyn.system.system import System
@@ -35,6 +36,7 @@ UNITS = {
     "attractor": "",
     "stable": "1",
     "periods": "1",
+    "rotation": "1",
     "peak_force": "N",
     "rms_force": "N",
     "impulse_rate": "N",
@@ -60,6 +62,8 @@ class ContactMeasures:
         False for an unstable orbit, which a machine does not stay on.
     periods : float
         Excitation periods over which is averaged.
+    rotation : bool
+        Whether the stop acts on a rotation: rad then stands for m below, and N m for N.
     peak_force, rms_force : float
         Largest force, and root of the mean of its square over all time, in N.
     impulse_rate : float
@@ -81,6 +85,7 @@ class ContactMeasures:
     attractor: str
     stable: bool
     periods: float
+    rotation: bool
     peak_force: float
     rms_force: float
     impulse_rate: float
@@ -89,6 +94,11 @@ class ContactMeasures:
     loss_power: float
     contact_share: float
     fastest_impact: float
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each number by its name."""
+        return units_where(UNITS, np.array([self.rotation]))
 
 
 def contact_measures(
@@ -127,7 +137,8 @@ def contact_measures(
     """
     check_types(source=(source, Orbit, Motion, Attractor))
     check_whole("contact_measures: periods", periods, 1, MOST_RECORDED)
-    check_stop(_system_of(source), stop)
+    system = _system_of(source)
+    check_stop(system, stop)
     if isinstance(source, Attractor):
         if source.kind == "failed":
             raise SystemModelError(f"the attractor's simulation failed: {source.failure}")
@@ -144,6 +155,7 @@ def contact_measures(
         name,
         stable,
         turns,
+        system.unit(system.stops[stop].at) == "rad",
         float(table.peak_force.max(initial=0.0)),
         math.sqrt(max(float(table.square.sum()), 0.0) / time),
         float(table.impulse.sum()) / time,
@@ -181,7 +193,7 @@ def measures_table(
     Returns
     -------
     dict of str to (k,) array
-        Units are in `UNITS` of its module; ``pandas.DataFrame`` takes it as it is.
+        Columns and units are those of `ContactMeasures`; ``pandas.DataFrame`` takes it as it is.
 
     Raises
     ------
@@ -251,9 +263,9 @@ def spectra_table(
     Returns
     -------
     dict of str to (k,) array
-        ``frequency_hz``, ``attractor`` and ``stable`` as in `measures_table`; ``mean`` in m, the
-        amplitudes ``order_1`` to ``order_<orders>`` in m, and ``rest``, the r.m.s. of all else, in
-        m. Rows ascend in frequency.
+        ``frequency_hz``, ``attractor`` and ``stable`` as in `measures_table`; ``mean``, the
+        amplitudes ``order_1`` to ``order_<orders>`` and ``rest``, the r.m.s. of all else, in m, of
+        a rotation in rad. Rows ascend in frequency.
 
     Raises
     ------
@@ -314,9 +326,11 @@ class SpectraMap:
     order : (m,)
         Middles of the bands, as multiples of the excitation frequency: 0, 1/parts, 2/parts, ...
     rms : (k, m)
-        Root of the mean square of what lies in each band, in m.
+        Root of the mean square of what lies in each band.
     rest : (k,)
-        Root of the mean square of what lies above the last band, in m.
+        Root of the mean square of what lies above the last band.
+    unit : str
+        Of both: m, or rad of a rotation.
     """
 
     frequency_hz: Real
@@ -325,6 +339,7 @@ class SpectraMap:
     order: Real
     rms: Real
     rest: Real
+    unit: str
 
 
 @shows_progress(of_number("motions"))
@@ -391,6 +406,7 @@ def spectra_map(
         np.arange(count) / parts,
         values[:, :-1],
         values[:, -1],
+        told(dict.fromkeys(spectrum.unit for spectrum in found)) or "m",
     )
 
 
@@ -407,6 +423,7 @@ class _Spectrum:
     frequency_hz: float
     attractor: str
     stable: bool
+    unit: str
     values: Real
 
 
@@ -449,7 +466,10 @@ def _spectrum(
     count = SAMPLES * math.ceil(orders / 32)
     times = motion.start_time + np.arange(turns * count) / (count * hz)
     y = motion.states(times)[:, : row.size] @ row
-    return _Spectrum(hz, name, stable, wanted(np.fft.rfft(y) / y.size, turns))
+    unit = "m"
+    if point is None or isinstance(point, str):
+        unit = motion.system.unit(check_observe(motion.system, point))
+    return _Spectrum(hz, name, stable, unit, wanted(np.fft.rfft(y) / y.size, turns))
 
 
 def _motion_on(source: Orbit | Motion | Attractor, periods: int) -> tuple[Motion, str, bool]:
@@ -505,7 +525,7 @@ def power_spectrum(
     -------
     frequency_hz : (k,)
     density : (k,)
-        In m²/Hz or (m/s)²/Hz.
+        In m²/Hz or (m/s)²/Hz; of a rotation rad stands for m.
 
     Raises
     ------

@@ -10,13 +10,11 @@ from matplotlib.axes import Axes
 from nldyn.base.errors import SystemModelError, check_types, shown
 from nldyn.bifurcations.kinds import kind_of
 from nldyn.curves.curves import Curve
-from nldyn.plot.diagram import (
-    PERIOD_COLOURS,
-    length_unit,
-    new_axes,
-)
-from nldyn.system.chart import UNITS
+from nldyn.plot.diagram import PERIOD_COLOURS, new_axes
+from nldyn.plot.words import unit_in
+from nldyn.system.chart import unit_of
 from nldyn.system.parameters import Parameter
+from nldyn.system.system import System
 
 TITLES = {
     "frequency_hz": "excitation frequency",
@@ -33,7 +31,6 @@ TITLES = {
     "spin_hz": "shaft speed",
     "speed_hz": "shaft speed and excitation frequency",
 }
-POWERS = {"N/m^exponent": "N/m$^p$"}
 MONITOR_NAMES = {
     "peak_force": "constant peak force",
     "max_penetration": "constant penetration",
@@ -72,8 +69,9 @@ def plot_curves(curves: Sequence[Curve], ax: Axes | None = None) -> Axes:
     ax = ax or new_axes(7.5, 5.0)
     everything = np.vstack([curve.values for curve in curves])
     scales, labels = [], []
-    for which, parameter in enumerate(curves[0].parameters):
-        scale, label = _scale_and_label(parameter, float(np.abs(everything[:, which]).max()))
+    system = curves[0].points[0].orbit.system
+    for parameter, values in zip(curves[0].parameters, everything.T, strict=True):
+        scale, label = _scale_and_label(parameter, float(np.abs(values).max()), system)
         scales.append(scale)
         labels.append(label)
     kinds = list(dict.fromkeys(curve.kind for curve in curves))
@@ -96,10 +94,10 @@ def plot_curves(curves: Sequence[Curve], ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _scale_and_label(parameter: Parameter, largest: float) -> tuple[float, str]:
+def _scale_and_label(parameter: Parameter, largest: float, system: System) -> tuple[float, str]:
     """Factor from SI to the unit drawn, and the label of an axis."""
+    title, unit = TITLES.get(parameter.name, parameter.name), unit_of(parameter, system)
     if parameter.name == "gap":
-        factor, unit = length_unit(largest)
-        return 1.0 / factor, f"gap ({unit})"
-    title, unit = TITLES.get(parameter.name, parameter.name), UNITS[parameter.name]
-    return 1.0, title if unit == "1" else f"{title} ({POWERS.get(unit, unit)})"
+        factor, unit = unit_in(unit, largest)
+        return 1.0 / factor, f"{title} ({unit})"
+    return 1.0, title if unit == "1" else f"{title} ({unit.replace('^exponent', '$^p$')})"

@@ -30,12 +30,12 @@ from nldyn.plot.words import (
     axis_unit,
     direction_of,
     displacement_of,
+    forces_of,
     units_of,
 )
 from nldyn.runtime.progress import in_notebook
 from nldyn.system.chart import THE_FREQUENCY, parameter_name
 from nldyn.system.naming import stop_name
-from nldyn.system.rigid_stop import AnyStop
 
 if TYPE_CHECKING:
     from nldyn.bifurcations.point import SpecialPoint
@@ -134,17 +134,6 @@ def beside_stable(branch: Branch, special: SpecialPoint) -> bool:
     lengths = [node.arclength for node in branch.nodes]
     after = int(np.searchsorted(lengths, special.point.arclength))
     return any(node.orbit.stable for node in branch.nodes[max(after - 1, 0) : after + 1])
-
-
-def length_unit(largest: float) -> tuple[float, str]:
-    """Choose the unit for an axis that reaches up to ``largest`` metres.
-
-    Examples
-    --------
-    >>> length_unit(2.3e-4)
-    (1e-06, 'µm')
-    """
-    return axis_unit(largest, LENGTHS)
 
 
 def mark_size(count: int) -> float:
@@ -388,7 +377,7 @@ def plot_orbit(
     y = history.displacement[orbit.observe]
     _draw_displacement(upper, history.time, y, places, words, units_of(direction))
     upper.tick_params(labelbottom=True)
-    _draw_forces(lower, history.time, history.force, orbit.system.stops)
+    _draw_forces(lower, history.time, history.force, orbit.system)
     _mark_deepest((upper, lower), [impact.time for impact in orbit.impact_list])
     upper.set_title(orbit_title(orbit))
     lower.set_xlabel("time (s)")
@@ -396,7 +385,7 @@ def plot_orbit(
 
 
 def stop_places(system: System, interface: str) -> list[float]:
-    """Displacements in m at which an interface meets its stops against the ground.
+    """Displacements in m, or rad, at which an interface meets its stops against the ground.
 
     Examples
     --------
@@ -597,15 +586,16 @@ def _draw_displacement(
 
 
 def _draw_forces(
-    ax: Axes, time: NDArray[np.float64], forces: NDArray[np.float64], stops: Sequence[AnyStop]
+    ax: Axes, time: NDArray[np.float64], forces: NDArray[np.float64], system: System
 ) -> None:
-    for number in range(len(stops)):
+    count = len(system.stops)
+    for number in range(count):
         colour = PERIOD_COLOURS[(number + 1) % len(PERIOD_COLOURS)]
-        label = stop_name(stops, number)
+        label = stop_name(system, number)
         ax.plot(time, forces[:, number], color=colour, linewidth=1.2, label=label)
-    ax.set_ylabel("contact force (N)")
+    ax.set_ylabel("{} ({})".format(*forces_of(system)))
     ax.set_ylim(bottom=0.0)
-    if len(stops) > 1:
+    if count > 1:
         ax.legend(fontsize="small", loc="upper right")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal
 
@@ -17,10 +18,12 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_choice, check_types, is_finite, numbers, shown
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.longterm.basins import Basins
+from nldyn.longterm.impacts import units_where
 from nldyn.longterm.measures import UNITS as MEASURE_UNITS
 from nldyn.longterm.measures import SpectraMap
 from nldyn.longterm.poincare import BruteForce, Column, impact_section, stroboscopic_section
 from nldyn.longterm.simulation import Motion
+from nldyn.orbits.history import told
 from nldyn.orbits.orbit import check_observe, stroboscopic
 from nldyn.plot.diagram import (
     PERIOD_COLOURS,
@@ -28,15 +31,23 @@ from nldyn.plot.diagram import (
     UNSTABLE,
     draw_legend,
     followed,
-    length_unit,
     new_axes,
     period_colours,
     plot_diagram,
     stability_runs,
 )
-from nldyn.plot.words import LENGTHS, Along, axis_unit, direction_of, displacement_of, units_of
+from nldyn.plot.words import (
+    Along,
+    axis_unit,
+    direction_of,
+    displacement_of,
+    told_of,
+    unit_in,
+    units_of,
+)
 from nldyn.search.diagram import Diagram
 from nldyn.system.chart import parameter_name
+from nldyn.system.system import System
 
 KIND_COLOURS = {
     "periodic": "#222222",
@@ -49,14 +60,13 @@ BEHIND = "#9a9a9a"  # states where no motion begins
 SHADE = "#e8c9a0"
 Quantity = Literal["peak", "strobe", "impact speed", "impact phase"]
 QUANTITIES = {
-    "peak": "largest displacement of {}",
-    "strobe": "displacement of {} at forcing phase zero",
+    "peak": "largest {}",
+    "strobe": "{} at forcing phase zero",
     "impact speed": "impact speed",
     "impact phase": "forcing phase of impacts",
 }
 WEAR_MARKS = "o^sDv"  # of measures, in their order: all can be hollow
 MOST_DECADES = 16  # beyond the digits of a number
-UNITS = {name: factor for factor, name in LENGTHS}
 
 
 def plot_section(
@@ -89,11 +99,12 @@ def plot_section(
         return _plot_impacts(motion, ax, stop)
     y, v = stroboscopic_section(motion, interface)
     name = interface or motion.system.interfaces[0]
-    factor, unit = length_unit(float(np.abs(y).max()))
-    pace, pace_unit = length_unit(float(np.abs(v).max()))
+    measure = motion.system.unit(name)
+    factor, unit = unit_in(measure, float(np.abs(y).max()))
+    pace, pace_unit = unit_in(measure, float(np.abs(v).max()))
     ax = ax if ax is not None else new_axes(7.0, 5.5)
     ax.plot(y / factor, v / pace, ".", markersize=1.5, color="black")
-    ax.set_xlabel(f"displacement of {name} ({unit})")
+    ax.set_xlabel(f"{told_of(motion.system, name)} ({unit})")
     ax.set_ylabel(f"velocity ({pace_unit}/s)")
     return ax
 
@@ -101,10 +112,11 @@ def plot_section(
 def _plot_impacts(motion: Motion, ax: Axes | None, stop: int) -> Axes:
     """Draw speed against forcing phase of the impacts on a stop."""
     phase, speed = impact_section(motion, stop)
-    pace, unit = length_unit(float(speed.max(initial=0.0)))
+    at = motion.system.stops[stop].at
+    pace, unit = unit_in(motion.system.unit(at), float(speed.max(initial=0.0)))
     ax = ax if ax is not None else new_axes(7.0, 5.5)
     ax.plot(phase, speed / pace, ".", markersize=1.5, color="black")
-    ax.set_xlabel(f"forcing phase of impacts on {motion.system.stops[stop].at} (°)")
+    ax.set_xlabel(f"forcing phase of impacts on {at} (°)")
     ax.set_ylabel(f"impact speed ({unit}/s)")
     return ax
 
@@ -134,8 +146,8 @@ def plot_brute_force(
     diagram : Diagram or iterable of Branch, optional
         Branches drawn below, in the same quantity; of peaks or stroboscopic displacements only.
     unit : str, optional
-        m, mm, µm or nm, per second for a speed; chosen from the size unless given. A phase is in
-        degrees.
+        m, mm, µm or nm, of a rotation rad, mrad, µrad or nrad, per second for a speed; chosen from
+        the size unless given. A phase is in degrees.
 
     Raises
     ------
@@ -147,16 +159,12 @@ def plot_brute_force(
         diagram=(diagram, Diagram, Iterable, None), unit=(unit, str, None),
     )  # fmt: skip
     check_choice("quantity", quantity, QUANTITIES)
-    if unit is not None:
-        check_choice("unit", unit, UNITS)
     branches = _branches_of(found, quantity, diagram)
     along = followed(branches) if branches else _along(found)
     sizes = [np.abs(_values(c, quantity)).max(initial=0.0) for c in found.columns]
-    factor, name = length_unit(float(max(sizes, default=1.0)))
-    if quantity == "impact phase":
-        factor, name = 1.0, "°"
-    elif unit is not None:
-        factor, name = UNITS[unit], unit
+    words, measure = _observed(found, quantity)
+    chosen = None if quantity == "impact phase" else unit
+    factor, name = unit_in(measure, float(max(sizes, default=1.0)), chosen)
     ax = ax if ax is not None else new_axes()
     if branches and quantity == "peak":
         plot_diagram(branches, ax, special_points=(), unit=name, references=False)
@@ -170,15 +178,31 @@ def plot_brute_force(
     ax.legend(handles=handles, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
     ax.set_xlabel(along.label)
     ending = "/s" if quantity == "impact speed" else ""
-    ax.set_ylabel(f"{QUANTITIES[quantity].format(found.observe)} ({name}{ending})")
+    ax.set_ylabel(f"{QUANTITIES[quantity].format(words)} ({name}{ending})")
     return ax
 
 
 def _along(found: BruteForce) -> Along:
     """How the values of columns are told."""
     largest = float(np.abs(found.values).max(initial=0.0))
-    system = found.columns[0].attractor.flow.system if found.columns else None
-    return Along.of(found.parameter, largest, system)
+    return Along.of(found.parameter, largest, _system_of(found))
+
+
+def _system_of(found: BruteForce) -> System | None:
+    """The system whose motions are drawn, if there are any."""
+    return found.columns[0].attractor.flow.system if found.columns else None
+
+
+def _observed(found: BruteForce, quantity: str) -> tuple[str, str]:
+    """The observed displacement in words, and the unit of what is drawn, of a speed times s."""
+    system = _system_of(found)
+    if system is None:
+        words, measure = displacement_of(found.observe), "m"
+    elif quantity == "impact speed":
+        words, measure = "", told(system.unit(stop.at) for stop in system.stops) or "m"
+    else:
+        words, measure = told_of(system, found.observe), system.unit(found.observe)
+    return words, "°" if quantity == "impact phase" else measure
 
 
 def _branches_of(
@@ -418,13 +442,15 @@ def plot_wear(
 
 def _unit_of_measures(table: Mapping[str, Any], measures: Sequence[str]) -> str:
     """Common unit of columns of a table of contact measures."""
-    known = [name for name in MEASURE_UNITS if name not in ("frequency_hz", "attractor", "stable")]
-    for column in ("frequency_hz", "attractor", "stable", *measures):
+    columns = ("frequency_hz", "attractor", "stable", "rotation")
+    known = [name for name in MEASURE_UNITS if name not in columns]
+    for column in (*columns, *measures):
         if column in measures and column not in known:
             raise SystemModelError(f"measures must be of {', '.join(known)}, got {shown(column)}")
         if column not in table:
             raise SystemModelError(f"table has no column '{column}'")
-    units = {MEASURE_UNITS[name] for name in measures}
+    told_units = units_where(MEASURE_UNITS, np.asarray(table["rotation"], dtype=bool))
+    units = {told_units[name] for name in measures}
     if isinstance(measures, str) or not 1 <= len(measures) <= len(WEAR_MARKS) or len(units) > 1:
         raise SystemModelError(
             f"measures must be one to {len(WEAR_MARKS)} names of one unit, got {shown(measures)}"
@@ -473,7 +499,8 @@ def plot_spectra(
         Range of the colours, down from the largest value; what is smaller has the lowest colour.
         The mean displacement is left out of the choice.
     unit : {"m", "mm", "µm", "nm"}, optional
-        Of the displacements; chosen from the size unless given.
+        Of the displacements, or of rotations "rad", "mrad", "µrad" or "nrad"; chosen from the size
+        unless given.
 
     Raises
     ------
@@ -497,12 +524,10 @@ def plot_spectra(
         raise SystemModelError(
             f"decades must lie above 0 and up to {MOST_DECADES}, got {shown(decades)}"
         )
-    if unit is not None:
-        check_choice("unit", unit, UNITS)
     largest = float(found.rms[:, 1:].max(initial=0.0))
     if largest == 0.0:
         raise SystemModelError("found holds no motion with a displacement that changes")
-    factor, name = length_unit(largest) if unit is None else (UNITS[unit], unit)
+    factor, name = unit_in(found.unit, largest, unit)
     ax = ax if ax is not None else new_axes()
     width = float(found.order[1] - found.order[0])
     edges = np.append(found.order - 0.5 * width, found.order[-1] + 0.5 * width)
@@ -515,7 +540,8 @@ def plot_spectra(
         image = ax.pcolormesh(
             [lefts[k], rights[k]], edges * height, values, norm=norm, cmap="magma", rasterized=True
         )
-    ax.figure.colorbar(image, ax=ax, label=f"r.m.s. displacement in a band ({name})")
+    what = displacement_of(direction="rotation" if found.unit == "rad" else "")
+    ax.figure.colorbar(image, ax=ax, label=f"r.m.s. {what} in a band ({name})")
     ax.set_xlim(lefts.min(), rights.max())
     ax.set_ylim(0.0, float(edges[-1] * heights.max()))
     ax.set_facecolor("0.85")
@@ -606,13 +632,13 @@ def plot_basins(
 
 
 def _scaled(axis: Axis, label: str, ends: Sequence[float]) -> str:
-    """Show an axis in m or m/s, by its label, in a unit of its size; any other as it is."""
-    unit = next((u for u in ("m", "m/s") if label.endswith(f" ({u})")), None)
-    if unit is None:
+    """Show an axis in m, rad, m/s or rad/s, by its label, in a unit of its size; else as it is."""
+    told = re.search(r" \((m|rad)(/s)?\)$", label)
+    if told is None:
         return label
-    factor, name = length_unit(max(abs(float(end)) for end in ends))
+    factor, name = unit_in(told[1], max(abs(float(end)) for end in ends))
     axis.set_major_formatter(lambda value, _: f"{value / factor:g}")
-    return label.removesuffix(f"({unit})") + f"({name}{unit[1:]})"
+    return f"{label[: told.start()]} ({name}{told[2] or ''})"
 
 
 def _points(name: str, given: Real) -> Real:

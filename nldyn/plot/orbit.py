@@ -15,14 +15,13 @@ from nldyn.plot.diagram import (
     PERIOD_COLOURS,
     STABLE,
     UNSTABLE,
-    length_unit,
     new_axes,
     orbit_title,
     stop_places,
 )
+from nldyn.plot.words import forces_of, told_of, unit_in
 from nldyn.system.naming import stop_name
 
-FORCE_PREFIXES = ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN"))
 FLOOR = 1e-7  # amplitudes below this share of the largest are not shown
 
 
@@ -64,7 +63,7 @@ def plot_history(
     name = _checked(orbit, ax, interface, samples)
     phases = drawn_phases(orbit, samples)
     y, _ = motion_at(orbit, name, phases)
-    factor, unit = length_unit(float(np.abs(y).max()))
+    factor, unit = unit_in(orbit.system.unit(name), float(np.abs(y).max()))
     ax = _axes(ax, orbit)
     ax.axhline(0.0, color="0.6", linewidth=0.6)
     ax.plot(phases / orbit.omega, y / factor, **_style(orbit))
@@ -74,7 +73,7 @@ def plot_history(
     if orbit.impact_list:
         _draw_legend(ax)
     ax.set_xlabel("time (s)")
-    ax.set_ylabel(f"displacement of {name} ({unit})")
+    ax.set_ylabel(f"{told_of(orbit.system, name)} ({unit})")
     return ax
 
 
@@ -102,8 +101,9 @@ def plot_phase_portrait(
     """
     name = _checked(orbit, ax, interface, samples)
     y, speed = motion_at(orbit, name, drawn_phases(orbit, samples))
-    factor, unit = length_unit(float(np.abs(y).max()))
-    pace, pace_unit = length_unit(float(np.abs(speed).max()))
+    measure = orbit.system.unit(name)
+    factor, unit = unit_in(measure, float(np.abs(y).max()))
+    pace, pace_unit = unit_in(measure, float(np.abs(speed).max()))
     ax = _axes(ax, orbit)
     ax.plot(y / factor, speed / pace, **_style(orbit))
     strobe = 2.0 * np.pi * np.arange(orbit.period, dtype=float)
@@ -114,7 +114,7 @@ def plot_phase_portrait(
         name_once = "stop" if number == 0 else None
         ax.axvline(gap / factor, color=PERIOD_COLOURS[1], linestyle="-.", label=name_once)
     _draw_legend(ax)
-    ax.set_xlabel(f"displacement of {name} ({unit})")
+    ax.set_xlabel(f"{told_of(orbit.system, name)} ({unit})")
     ax.set_ylabel(f"velocity ({pace_unit}/s)")
     return ax
 
@@ -143,7 +143,7 @@ def plot_spectrum(
     """
     name = _checked(orbit, ax, interface)
     lines = harmonics(orbit, name, orders=orders)
-    factor, unit = length_unit(float(lines.amplitude.max()))
+    factor, unit = unit_in(orbit.system.unit(name), float(lines.amplitude.max()))
     height = lines.amplitude / factor
     shown = np.flatnonzero(height > FLOOR * height.max())
     floor = 0.5 * float(height[shown].min(initial=height.max())) or 1.0
@@ -183,7 +183,8 @@ def plot_contact_force(orbit: Orbit, ax: Axes | None = None, *, samples: int = 4
     phases = drawn_phases(orbit, samples)
     system = orbit.system
     forces = orbit.history_at(phases).force.T
-    factor, unit = force_unit(float(np.abs(forces).max(initial=0.0)))
+    words, measure = forces_of(system)
+    factor, unit = unit_in(measure, float(np.abs(forces).max(initial=0.0)))
     ax = _axes(ax, orbit)
     ax.axhline(0.0, color="0.6", linewidth=0.6)
     for row in range(len(system.stops)):
@@ -195,12 +196,12 @@ def plot_contact_force(orbit: Orbit, ax: Axes | None = None, *, samples: int = 4
             color=colour,
             linewidth=1.4,
             linestyle=style,
-            label=stop_name(system.stops, row),
+            label=stop_name(system, row),
         )
     if system.stops:
         _draw_legend(ax)
     ax.set_xlabel("time (s)")
-    ax.set_ylabel(f"contact force ({unit})")
+    ax.set_ylabel(f"{words} ({unit})")
     return ax
 
 
@@ -222,17 +223,6 @@ def drawn_phases(orbit: Orbit, samples: int) -> Real:
 def motion_at(orbit: Orbit, interface: str, phases: Real) -> tuple[Real, Real]:
     """Displacement and velocity of an interface at forcing phases."""
     return orbit.system.displacement(interface, orbit.states(phases), phases, orbit.omega)
-
-
-def force_unit(largest: float) -> tuple[float, str]:
-    """Choose the unit for an axis that reaches up to ``largest`` newtons.
-
-    Examples
-    --------
-    >>> force_unit(2300.0)
-    (1000.0, 'kN')
-    """
-    return next((p for p in FORCE_PREFIXES if largest >= p[0]), (1.0, "N"))
 
 
 def _axes(ax: Axes | None, orbit: Orbit) -> Axes:

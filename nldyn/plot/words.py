@@ -6,15 +6,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from nldyn.base.errors import check_choice
+from nldyn.orbits.history import told
 from nldyn.system.chart import FREQUENCY, parameter_name, unit_of, words_of
-from nldyn.system.naming import is_angle
+from nldyn.system.naming import is_angle, moment_unit
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
 LENGTHS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 ANGLES = ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "µrad"), (1e-9, "nrad"))
 FORCES = ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN"))
-PREFIXED = {"m": LENGTHS, "rad": ANGLES, "N": FORCES}
+MOMENTS = tuple((factor, f"{name} m") for factor, name in FORCES)
+PREFIXED = {"m": LENGTHS, "rad": ANGLES, "N": FORCES, "N m": MOMENTS}
 
 
 @dataclass(frozen=True)
@@ -45,9 +48,7 @@ class Along:
     @classmethod
     def of(cls, parameter: Parameter, largest: float, system: System | None = None) -> Along:
         """For values up to a largest one; of a system, whose stops may act on rotations."""
-        unit = unit_of(parameter)
-        if parameter.name == "gap" and system is not None:
-            unit = system.unit(system.stops[parameter.index].at)
+        unit = unit_of(parameter, system)
         if unit in PREFIXED:
             return cls(parameter, *axis_unit(largest, PREFIXED[unit]))
         return cls(parameter, 1.0, "" if unit == "1" else unit)
@@ -121,9 +122,42 @@ def direction_of(system: System, interface: str, told: str = "") -> str:
     return told or ("rotation" if system.unit(interface) == "rad" else "")
 
 
-def units_in(measure: str) -> Sequence[tuple[float, str]]:
-    """The units of what is measured in m or rad, the largest first."""
-    return ANGLES if measure == "rad" else LENGTHS
+def unit_in(measure: str, largest: float, chosen: str | None = None) -> tuple[float, str]:
+    """Choose the unit for values in m, rad, N or N m up to a largest one; in another, that.
+
+    Raises
+    ------
+    SystemModelError
+        If a chosen unit is none of these.
+
+    Examples
+    --------
+    >>> unit_in("m", 2.3e-4), unit_in("N m", 2300.0), unit_in("m, rad", 1e-5)
+    ((1e-06, 'µm'), (1000.0, 'kN m'), (1.0, 'm, rad'))
+    """
+    units = PREFIXED.get(measure, ((1.0, measure),))
+    if chosen is None:
+        return axis_unit(largest, units)
+    check_choice("unit", chosen, [name for _, name in units])
+    return next(each for each in units if each[1] == chosen)
+
+
+def told_of(system: System, interface: str, direction: str = "") -> str:
+    """What is drawn of an interface of a system, in words; see `displacement_of`."""
+    return displacement_of(interface, direction_of(system, interface, direction))
+
+
+def forces_of(system: System) -> tuple[str, str]:
+    """What the stops of a system act with, in words, and its unit.
+
+    Examples
+    --------
+    >>> from nldyn import Stop
+    >>> forces_of(System.from_modal([10.0], {"tip": [1.0]}, stops=[Stop("tip", 1e6)]))
+    ('contact force', 'N')
+    """
+    unit = told(moment_unit(system.unit(stop.at)) for stop in system.stops) or "N"
+    return "contact moment" if unit == "N m" else "contact force", unit
 
 
 def displacement_of(name: str = "", direction: str = "") -> str:

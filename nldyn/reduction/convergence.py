@@ -48,7 +48,7 @@ QUANTITIES = {
     "eigenfrequency": "eigenfrequencies",
     "receptance": "receptance",
     "peak_hz": "peak frequency",
-    "peak_m": "peak height",
+    "peak_height": "peak height",
     "fold_flip": "folds and flips",
     "force": "contact force",
     "contact": "contact duration",

@@ -33,6 +33,8 @@ class LoadCase:
         alpha in 1/s and beta in s of the damping alpha M + beta K of the component.
     springs : tuple
         Springs at the interfaces.
+    rotations : set of str
+        The interfaces that turn: their displacements are in rad.
 
     Raises
     ------
@@ -54,6 +56,7 @@ class LoadCase:
     observe: str | None = None
     rayleigh: tuple[float, float] = (0.0, 0.0)
     springs: tuple[AnySpring, ...] = ()
+    rotations: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         check_range(self.range_hz)
@@ -73,7 +76,7 @@ class LoadCase:
         SystemModelError
             As `System.from_reduced`.
         """
-        return system_of_reduced(
+        system = system_of_reduced(
             reduced,
             self.observe,
             self.rayleigh,
@@ -83,6 +86,7 @@ class LoadCase:
             excitation=self.excitation,
             springs=self.springs,
         )
+        return replace(system, rotations=self.rotations)
 
 
 def system_of_reduced(

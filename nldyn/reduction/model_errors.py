@@ -34,7 +34,7 @@ MATCH = 0.02  # special points of one kind farther apart are not the same
 FEWEST_REFERENCE_MODES = 40
 MASSLESS = "its interfaces have no mass, so that a stop has no equation of motion"
 MOVED = 1.001  # times an orbit: the start from which the time of Newton's method is measured
-BRANCH_QUANTITIES = ("peak_hz", "peak_m", "fold_flip")  # errors that need the whole range
+BRANCH_QUANTITIES = ("peak_hz", "peak_height", "fold_flip")  # errors that need the whole range
 VISIBLE = 1e-6  # of the largest displacement at an interface: that of a mode which is seen there
 
 
@@ -105,7 +105,7 @@ class Errors:
         Largest of the first three that an interface sees, or of as many as the model has.
     receptance : float
         ``norm(H - H_ref) / norm(H_ref)`` over the range.
-    peak_hz, peak_m : float
+    peak_hz, peak_height : float
         Frequency and height of the highest resonance peak.
     fold_flip : float
         Largest error of a fold's or flip's frequency, of those that both models have; nan if there
@@ -121,7 +121,7 @@ class Errors:
     eigenfrequency: float
     receptance: float
     peak_hz: float
-    peak_m: float
+    peak_height: float
     fold_flip: float
     counts: tuple[int, int] | None
     force: float

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from nldyn.plot.diagram import branch_curve, stability_runs
-from nldyn.plot.words import FORCES, Along, axis_unit, units_in
+from nldyn.plot.words import FORCES, Along, unit_in
 from nldyn.system.naming import stop_name
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def _peak_line(nodes: Sequence[BranchNode], along: Along, observe: str) -> str:
 
     def told(node: BranchNode) -> str:
         size = node.orbit.max_abs_displacement
-        factor, unit = axis_unit(size, units_in(measure))
+        factor, unit = unit_in(measure, size)
         return f"{size / factor:.4g} {unit} at {along.told(node.value)}"
 
     line = f"largest {'rotation' if measure == 'rad' else 'displacement'} of '{observe}': "
@@ -91,7 +91,7 @@ def _contact_line(
         hit = hits[id(node)]
         if hit is None:
             return "none"
-        place = f", {stop_name(stops, hit.stop)}" if len(stops) > 1 else ""
+        place = f", {stop_name(nodes[0].orbit.system, hit.stop)}" if len(stops) > 1 else ""
         value, moment = _hardness(hit), " m" if angle else ""
         scale = ((1.0, "N s"),) if rigid else FORCES
         factor, unit = next((each for each in scale if value >= each[0]), scale[-1])

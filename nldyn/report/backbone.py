@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from nldyn.curves.backbone import Backbone, farthest_from
 from nldyn.curves.curves import Curve
 from nldyn.plot.diagram import PERIOD_COLOURS, file_axes, save_figure
-from nldyn.plot.words import axis_unit, units_in
+from nldyn.plot.words import unit_in
 from nldyn.report.results import write_table
 from nldyn.runtime.result_directory import result_directory
 
@@ -64,7 +64,7 @@ def measure_of(found: Backbone) -> str:
 
 def draw_forced(ax: Axes, forced: Curve, found: Backbone) -> None:
     """Add a curve of phase resonance to the backbone that is drawn."""
-    factor, _ = axis_unit(float(found.amplitude.max()), units_in(measure_of(found)))
+    factor, _ = unit_in(measure_of(found), float(found.amplitude.max()))
     sizes = np.array([farthest_from(found.rest_m, orbit) for orbit in forced.orbits])
     hz = [orbit.frequency_hz for orbit in forced.orbits]
     ax.plot(hz, sizes / factor, "--", color=PERIOD_COLOURS[1], label="forced, in phase resonance")
@@ -75,7 +75,7 @@ def plot_backbone(found: Backbone, title: str = "") -> Axes:
     """Draw the amplitude against the frequency of the free motion; crosses are unstable."""
     ax = file_axes()
     measure = measure_of(found)
-    factor, unit = axis_unit(float(found.amplitude.max()), units_in(measure))
+    factor, unit = unit_in(measure, float(found.amplitude.max()))
     what = "rotation" if measure == "rad" else "displacement"
     ax.plot(found.frequency_hz, found.amplitude / factor, ".-", color=PERIOD_COLOURS[0])
     unstable = ~found.stable

@@ -104,7 +104,7 @@ def plot_cost(study: ConvergenceStudy, title: str = "") -> Axes:
     by_modes = counts_vary(study)
     series = study.series() if by_modes else study.mesh_series()
     numbers = [model.modes if by_modes else model.dofs for model in study.models]
-    draw_series(ax, study, series, "peak_m", times, "o", numbers)
+    draw_series(ax, study, series, "peak_height", times, "o", numbers)
     draw_series(ax, study, series, "fold_flip", times, "s", numbers)
     said = "kept modes" if by_modes else "degrees of freedom"
     for label, colour in colours(series).items():

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from nldyn.orbits.orbit import Orbit
-from nldyn.plot.diagram import length_unit
-from nldyn.plot.words import axis_unit
+from nldyn.plot.words import axis_unit, unit_in
 from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy
 from nldyn.reduction.model_errors import (
     EIGENFREQUENCIES,
@@ -17,6 +16,7 @@ from nldyn.reduction.model_errors import (
     counted_modes,
     largest_force,
 )
+from nldyn.report.convergence_tables import study_units
 from nldyn.report.offline import Table, as_table, versions
 from nldyn.report.orbit_content import known
 
@@ -82,8 +82,9 @@ def views(study: ConvergenceStudy) -> list[dict[str, Any]]:
 def panels(study: ConvergenceStudy) -> list[dict[str, Any]]:
     """The numbers of all models, of the reference, and the span of the larger half of models."""
     contact = study.reference.orbit or study.best.orbit
-    metre, length = length_unit(
-        max((m.peak.max_abs_displacement for m in study.models if m.peak), default=1.0)
+    measure, force = study_units(study)
+    metre, length = unit_in(
+        measure, max((m.peak.max_abs_displacement for m in study.models if m.peak), default=1.0)
     )
     durations = [contact_time(m.orbit) for m in study.models if m.orbit]
     second, time = axis_unit(max(durations, default=0.0), TIMES)
@@ -95,7 +96,7 @@ def panels(study: ConvergenceStudy) -> list[dict[str, Any]]:
         ("eigenfrequencies", "Hz", eigenfrequencies, eigenfrequencies(study.reference)),
         ("peak frequency", "Hz", of_peak(lambda orbit: orbit.frequency_hz), ()),
         ("peak height", length, of_peak(lambda orbit: orbit.max_abs_displacement / metre), ()),
-        ("contact force", "N", of_orbit(largest_force), of(largest_force, contact)),
+        ("contact force", force, of_orbit(largest_force), of(largest_force, contact)),
         ("contact duration", time, of_orbit(duration), of(duration, contact)),
     ]
     found = []

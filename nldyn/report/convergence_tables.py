@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from nldyn.plot.words import forces_of
 from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy
 from nldyn.reduction.model_errors import contact_time, largest_force
 from nldyn.report.offline import Table
 from nldyn.report.results import if_known
 
 COLUMNS = (
-    "label", "dofs", "modes", "size", "peak_hz", "peak_m", "force_n", "contact_s", "folds", "flips",
-    "seconds_per_orbit", "branch_seconds",
+    "label", "dofs", "modes", "size", "peak_hz", "peak_{}", "force_{}", "contact_s", "folds",
+    "flips", "seconds_per_orbit", "branch_seconds",
     *(f"{quantity}_error" for quantity in QUANTITIES), "missing", "extra", "note",
 )  # fmt: skip
 SPECIAL_COLUMNS = ("label", "modes", "type", "frequency_hz")
@@ -20,10 +21,20 @@ SPECIAL_COLUMNS = ("label", "modes", "type", "frequency_hz")
 
 def study_tables(study: ConvergenceStudy) -> dict[str, Table]:
     """The models, and their folds and flips."""
+    units = [unit.lower().replace(" ", "_") for unit in study_units(study)]
+    columns = [name.format(units["force" in name]) for name in COLUMNS]
     return {
-        "models": (COLUMNS, list(model_rows(study))),
+        "models": (columns, list(model_rows(study))),
         "folds and flips": (SPECIAL_COLUMNS, list(special_rows(study))),
     }
+
+
+def study_units(study: ConvergenceStudy) -> tuple[str, str]:
+    """Units of the observed displacement and of the forces of the stops."""
+    for orbit in (model.peak or model.orbit for model in study.models):
+        if orbit is not None:
+            return orbit.system.unit(orbit.observe), forces_of(orbit.system)[1]
+    return "m", "N"
 
 
 def model_rows(study: ConvergenceStudy) -> Iterator[tuple[object, ...]]:

@@ -260,7 +260,7 @@ def stops_of(orbit: Orbit) -> dict[str, Any]:
     """The stops' names, and which act on rotations."""
     system = orbit.system
     return {
-        "names": [stop_name(system.stops, index) for index in range(len(system.stops))],
+        "names": [stop_name(system, index) for index in range(len(system.stops))],
         "turn": [system.unit(stop.at) == "rad" for stop in system.stops],
     }
 

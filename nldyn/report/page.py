@@ -38,7 +38,6 @@ from nldyn.report.orbit_content import (
     stops_of,
 )
 from nldyn.report.stop_spheres import not_drawn
-from nldyn.scene.build import direction_at
 from nldyn.search.diagram import Diagram
 from nldyn.system.chart import THE_FREQUENCY, parameter_name
 from nldyn.system.naming import is_angle
@@ -119,7 +118,7 @@ def write_page(
     told = told_branches(diagram, tables)
     heights = [[node.orbit.max_abs_displacement for node in branch.nodes] for branch in told]
     system = branches[0].points[0].system if branches else None
-    direction = direction_at(scene, diagram.observe) if scene else ""
+    direction = scene.direction_at(diagram.observe) if scene else ""
     if system is not None:
         direction = direction_of(system, diagram.observe, direction)
     factor, unit = axis_unit(max((max(y) for y in heights), default=1.0), units_of(direction))

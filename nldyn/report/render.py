@@ -20,7 +20,7 @@ from nldyn.report.results import write_table
 from nldyn.report.stop_spheres import stop_sphere, stops_to_draw, with_stops_not_drawn
 from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.runtime.result_directory import result_directory
-from nldyn.scene.build import Structure, build_structure, build_system, direction_at
+from nldyn.scene.build import Structure, build_structure, build_system
 from nldyn.scene.checks import check_computable
 from nldyn.scene.messages import scene_error
 
@@ -144,7 +144,7 @@ def render_scene(
         write_table(folder / "modes.csv", table.columns(), table.rows())
         (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
         if orbit is not None:
-            save_orbit(orbit, folder, direction_at(scene, orbit.observe))
+            save_orbit(orbit, folder, scene.direction_at(orbit.observe))
         tell = shares.part("pictures")
         drawing = Drawing.of(scene, structure, folder, modes, view, tell)
         assert drawing is not None  # there is a mesh

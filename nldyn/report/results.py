@@ -26,7 +26,6 @@ from nldyn.report.answer import answer_lines
 from nldyn.report.offline import Table
 from nldyn.report.page import write_page
 from nldyn.runtime.result_directory import result_directory
-from nldyn.scene.build import direction_at
 from nldyn.search.exploration import Exploration
 from nldyn.system.chart import THE_FREQUENCY, parameter_name
 
@@ -142,7 +141,7 @@ def write_results(
             columns = (parameter_name(diagram.parameter), *COVERAGE_COLUMNS)
             write_table(folder / "coverage.csv", columns, coverage_rows(exploration))
         title = scene.title if scene else ""
-        direction = direction_at(scene, diagram.observe) if scene else ""
+        direction = scene.direction_at(diagram.observe) if scene else ""
         save_diagram(diagram, folder, title=title, direction=direction, yscale=yscale)
         answer = answer_lines(diagram, tables["special_points"])
         told = {**summary(diagram), "answer": answer}

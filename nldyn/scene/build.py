@@ -30,7 +30,6 @@ from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import Scene
 from nldyn.scene.stops_and_loads import acting_elements
 from nldyn.system.loads import BaseMotion
-from nldyn.system.naming import is_angle
 from nldyn.system.ride import carried_apart, told_apart
 from nldyn.system.spin import Spin
 from nldyn.system.system import Elements, System
@@ -262,16 +261,6 @@ def place(interface: str) -> tuple[str, str]:
     return component, name
 
 
-def direction_at(scene: Scene, interface: str) -> str:
-    """The direction of an interface of a scene; empty where none is told."""
-    part, name = scene, interface
-    if scene.components:
-        component, name = place(interface)
-        part = scene.component_scenes[component]
-    given = part.matrices.interfaces if part.matrices is not None else part.interfaces
-    return getattr(given.get(name), "direction", None) or ""
-
-
 def build_candidates(scene: Scene, component: AnyComponent | None = None) -> Candidates:
     """The modes among which a scene with a tolerance chooses, by its linear response alone.
 
@@ -361,8 +350,7 @@ def build_system(scene: Scene, reduced: cms.ReducedModel | None = None) -> Syste
     """
     system = _relative_system(scene, reduced)
     _check_rides(scene, system)
-    turning = (name for name in system.interfaces if is_angle(direction_at(scene, name)))
-    system = replace(system, rotations=frozenset(turning))
+    system = replace(system, rotations=scene.rotations)
     if scene.observe is None or not scene.observe.absolute:
         return system
     with told_as(scene, ("observe", "absolute"), SystemModelError):

@@ -45,4 +45,5 @@ def load_case_of(scene: Scene) -> LoadCase:
         modal_damping=scene.damping.modal_ratio,
         observe=scene.observed,
         rayleigh=scene.damping.rayleigh,
+        rotations=scene.rotations,
     )

@@ -27,6 +27,7 @@ from pydantic import (
 from nldyn.base.errors import LARGEST_FREQUENCY
 from nldyn.scene.messages import quoted, show
 from nldyn.system.loads import LARGEST_PHASE, MOST_HARMONIC
+from nldyn.system.naming import is_angle
 from nldyn.system.springs_dampers import LARGEST_DEGREE
 from nldyn.system.stop import LARGEST_EXPONENT
 
@@ -1115,6 +1116,22 @@ class Scene(StructureTables):
             parts = self.component_scenes.items()
             return [f"{name}.{at}" for name, part in parts for at in part.interface_names]
         return list(self.interfaces)
+
+    def direction_at(self, interface: str) -> str:
+        """The direction of an interface; empty where none is told."""
+        part, name = self, interface
+        if self.components:
+            component, _, name = interface.partition(".")
+            part = self.component_scenes[component]
+        given = part.matrices.interfaces if part.matrices is not None else part.interfaces
+        return getattr(given.get(name), "direction", None) or ""
+
+    @property
+    def rotations(self) -> frozenset[str]:
+        """The interfaces that turn."""
+        return frozenset(
+            name for name in self.interface_names if is_angle(self.direction_at(name))
+        )
 
     @property
     def load_names(self) -> list[str]:

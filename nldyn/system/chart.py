@@ -18,6 +18,7 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.system.friction import DryFriction
+from nldyn.system.naming import turned
 from nldyn.system.parameters import (
     OF_SLIDERS,
     OF_SPRINGS,
@@ -39,6 +40,7 @@ _OF_STOPS = OF_STOPS
 _OF_DAMPERS = ("coefficient",)
 _OF_SPRINGS = {"spring_stiffness": "stiffness"}  # and what it is called there
 _OF_MODES = ("modal_damping", "natural_frequency_hz")
+OF_ELEMENTS = (*_OF_STOPS, *SOURCES, *OF_SLIDERS, *_OF_DAMPERS, *_OF_SPRINGS, *OF_SPRINGS)
 UNITS = {
     "frequency_hz": "Hz",
     SPIN: "Hz",
@@ -75,10 +77,7 @@ POSITIVE = (
     "normal_force",
     "natural_frequency_hz",
 )  # there is no system where they are zero
-NAMES = (
-    *(FREQUENCY, *_OF_STOPS, *SOURCES, *OF_SLIDERS, *_OF_DAMPERS, *_OF_SPRINGS),
-    *(*OF_SPRINGS, *_OF_MODES, SPIN, SPEED),
-)
+NAMES = (FREQUENCY, *OF_ELEMENTS, *_OF_MODES, SPIN, SPEED)
 THE_FREQUENCY = Parameter(FREQUENCY)
 LAST_DIGIT = 1e-14  # relative: a value so near to the end of its range is that
 
@@ -227,9 +226,15 @@ def label_of(parameter: Parameter) -> str:
     return words if unit == "1" else f"{words} ({unit})"
 
 
-def unit_of(parameter: Parameter) -> str:
-    """Unit of a parameter, 1 if it has none."""
-    return parameter.unit if isinstance(parameter, OwnParameter) else UNITS[parameter.name]
+def unit_of(parameter: Parameter, system: System | None = None) -> str:
+    """Unit of a parameter, 1 if it has none; of a system, whose elements may act on rotations."""
+    if isinstance(parameter, OwnParameter):
+        return parameter.unit
+    unit = UNITS[parameter.name]
+    if system is None or parameter.name not in OF_ELEMENTS:
+        return unit
+    at = elements_of(system, parameter.name)[parameter.index].at
+    return turned(unit) if system.unit(at) == "rad" else unit
 
 
 def words_of(parameter: Parameter) -> str:
@@ -289,16 +294,18 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
         return float(_polynomial(system, index).coefficients[int(name[1:]) - 1])
     if name == "friction":
         return system.sliders[index].friction.coefficient
-    elements: Sequence[Any] = system.stops
+    return float(getattr(elements_of(system, name)[index], _OF_SPRINGS.get(name, name)))
+
+
+def elements_of(system: System, name: str) -> Sequence[Any]:
+    """The elements of a system of which a parameter of some name is a number."""
     if name in OF_SLIDERS:
-        elements = system.sliders
-    elif name in SOURCES:
-        elements = system.excitation
-    elif name in _OF_DAMPERS:
-        elements = system.dampers
-    elif name in _OF_SPRINGS:
-        elements = system.springs
-    return float(getattr(elements[index], _OF_SPRINGS.get(name, name)))
+        return system.sliders
+    if name in SOURCES:
+        return system.excitation
+    if name in _OF_DAMPERS:
+        return system.dampers
+    return system.springs if name in (*_OF_SPRINGS, *OF_SPRINGS) else system.stops
 
 
 def with_value(system: System, parameter: Parameter, value: float) -> System:

@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from typing import TYPE_CHECKING
 
-from nldyn.system.rigid_stop import AnyStop
+if TYPE_CHECKING:
+    from nldyn.system.system import System
 
 
 def is_angle(direction: str) -> bool:
     """Whether an interface turns, by its direction."""
     return direction.startswith("rotation")
+
+
+def turned(unit: str) -> str:
+    """What stands for a unit where something turns: rad for m, and N m for N.
+
+    Examples
+    --------
+    >>> turned("m/s"), turned("N s/m"), turned("N/m^exponent"), turned("W")
+    ('rad/s', 'N m s/rad', 'N m/rad^exponent', 'W')
+    """
+    if unit == "kg m":  # of an unbalance, which times a squared speed is a force
+        return "kg m²"
+    return re.sub(r"\bN\b", "N m", re.sub(r"\bm\b", "rad", unit))
 
 
 def moment_unit(unit: str) -> str:
@@ -20,26 +35,26 @@ def moment_unit(unit: str) -> str:
     >>> moment_unit("rad"), moment_unit("m")
     ('N m', 'N')
     """
-    return "N m" if unit == "rad" else "N"
+    return turned("N") if unit == "rad" else "N"
 
 
-def stop_name(stops: Sequence[AnyStop], index: int) -> str:
+def stop_name(system: System, index: int) -> str:
     """Name a stop by its interfaces and, where several share them, by its direction and gap.
 
     Numbers are no names: Python and the keys of a scene count from 0, people from 1.
 
     Examples
     --------
-    >>> from nldyn import Stop
+    >>> from nldyn import Stop, System
     >>> pair = [Stop.linear("tip", 1e6, gap=1e-3, direction=d) for d in (1, -1)]
-    >>> stop_name(pair, 1), stop_name(pair[:1], 0)
-    ("stop at 'tip', direction -1", "stop at 'tip'")
+    >>> stop_name(System.from_modal([10.0], {"tip": [1.0]}, stops=pair), 1)
+    "stop at 'tip', direction -1"
     """
-    stop = stops[index]
+    stops, stop = system.stops, system.stops[index]
     name = f"stop at '{stop.at}'" + (f" against '{stop.against}'" if stop.against else "")
     alike = [other for other in stops if (other.at, other.against) == (stop.at, stop.against)]
     if any(other.direction != stop.direction for other in alike):
         name += f", direction {stop.direction:+d}"
     if any(other.direction == stop.direction and other.gap != stop.gap for other in alike):
-        name += f", gap {stop.gap:g} m"
+        name += f", gap {stop.gap:g} {system.unit(stop.at)}"
     return name

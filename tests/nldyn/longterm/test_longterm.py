@@ -557,6 +557,26 @@ def test_wear_is_drawn_by_kind_and_measure(one_dof, from_35_to_40):
         plot_wear({"frequency_hz": np.ones(1)})
 
 
+def test_long_motions_of_rotations_are_drawn_and_listed_in_rad(one_dof):
+    """The numbers stay as they are: rad stands for m, and N m for N."""
+    turning = replace(one_dof, rotations=frozenset(one_dof.interfaces))
+    straight, turned = (
+        brute_force(system, (20.0, 21.0), points=2, directions=["up"])
+        for system in (one_dof, turning)
+    )
+    assert plot_brute_force(turned).get_ylabel() == "largest rotation of middle (µrad)"
+    assert plot_brute_force(turned, quantity="impact speed").get_ylabel().endswith("(mrad/s)")
+    assert plot_wear(measures_table(turned)).get_ylabel() == "contact force (N m)"
+    tables = measures_table(straight), measures_table(turned)
+    np.testing.assert_array_equal(tables[0]["peak_force"], tables[1]["peak_force"])
+    assert (spectra_map(straight).unit, spectra_map(turned).unit) == ("m", "rad")
+    orbit = solve_orbit(turning, 20.0)
+    assert contact_measures(orbit).units["fastest_impact"] == "rad/s"
+    motion = simulate(turning, 20.0, 4, transient=100)
+    assert plot_section(motion).get_xlabel() == "rotation of middle (µrad)"
+    assert plot_section(motion, stop=0).get_ylabel() == "impact speed (mrad/s)"
+
+
 def test_a_sweep_has_no_harmonics(one_dof):
     with pytest.raises(SystemModelError, match="needs a motion at constant frequency"):
         spectra_table([sweep(one_dof, (20.0, 21.0), 5.0)])

@@ -1,5 +1,7 @@
 """Pictures of one orbit, and labels under the pointer."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.backend_bases import MouseEvent
@@ -52,6 +54,24 @@ def test_unstable_orbits_are_dotted(plot, stable, unstable):
     for orbit in (stable, unstable):
         curve = max(plot(orbit).lines, key=lambda line: len(line.get_xdata()))
         assert (curve.get_linestyle() == "-") == orbit.stable
+
+
+@pytest.mark.parametrize(
+    ("plot", "x", "y"),
+    [
+        (plot_history, "time (s)", "rotation of middle (µrad)"),
+        (plot_phase_portrait, "rotation of middle (µrad)", "velocity (mrad/s)"),
+        (plot_spectrum, "frequency (Hz)", "amplitude of middle (µrad)"),
+        (plot_contact_force, "time (s)", "contact moment (N m)"),
+    ],
+)
+def test_rotations_are_drawn_in_rad_and_newton_metres(plot, x, y, stable):
+    """The numbers stay as they are."""
+    turning = replace(stable.system, rotations=frozenset({"middle"}))
+    ax, same = plot(solve_orbit(turning, 25.3)), plot(stable)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (x, y)
+    for line, other in zip(ax.lines, same.lines, strict=True):
+        np.testing.assert_array_equal(line.get_xydata(), other.get_xydata())
 
 
 def test_history_reaches_the_largest_displacement(stable):

@@ -1,6 +1,7 @@
 """What a diagram shows: stable and unstable parts, colours by period, marks."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -18,20 +19,31 @@ from nldyn.plot.curves import _scale_and_label
 from nldyn.plot.diagram import (
     beside_stable,
     branch_curve,
-    length_unit,
     marked_points,
     plot_diagram,
     plot_orbit,
     save_diagram,
     stability_runs,
 )
+from nldyn.plot.words import unit_in
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene
 from nldyn.system.chart import NAMES, UNITS
-from nldyn.system.loads import Unbalance
-from nldyn.system.parameters import Parameter
+from nldyn.system.loads import HarmonicForce, Unbalance
+from nldyn.system.parameters import OF_SPRINGS, Parameter
+from nldyn.system.springs_dampers import Damper, PolynomialSpring, Spring
 from nldyn.system.stop import Stop
 from nldyn.system.system import System
+
+OF_ROTATIONS = {
+    "m": "rad",
+    "N": "N m",
+    "N/m": "N m/rad",
+    "N s/m": "N m s/rad",
+    "s/m": "s/rad",
+    "N/m$^p$": "N m/rad$^p$",
+    "kg m": "kg m²",
+} | {f"N/m^{power}": f"N m/rad^{power}" for power in range(1, 10)}
 
 
 @given(st.lists(st.booleans(), max_size=30))
@@ -143,15 +155,28 @@ def test_axes_of_the_caller_are_used():
     ("size", "unit"), [(2.0, "m"), (2e-3, "mm"), (2.3e-4, "µm"), (0.0, "m"), (1e-12, "nm")]
 )
 def test_unit(size, unit):
-    assert length_unit(size)[1] == unit
+    assert unit_in("m", size)[1] == unit
+    assert unit_in("rad", size)[1] == unit.removesuffix("m") + "rad"
+    assert unit_in("m", size, "mm") == (1e-3, "mm")
+    with pytest.raises(ValueError, match="unit must be one of m, mm, µm, nm, got 'mrad'"):
+        unit_in("m", size, "mrad")
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_axes_of_curves_name_every_parameter_and_its_unit(name):
-    _, label = _scale_and_label(Parameter(name), 1.0)
+    spring = PolynomialSpring("tip", [1.0] * 9) if name in OF_SPRINGS else Spring("tip", 1.0)
+    system = System.from_modal(
+        [10.0], {"tip": [1.0], "slide": [0.5]}, springs=[spring], dampers=[Damper("tip", 1.0)],
+        stops=[Stop("tip", 1e6, tangent="slide", friction=0.1)],
+        excitation=[HarmonicForce("tip", 1.0)],
+    )  # fmt: skip
+    _, label = _scale_and_label(Parameter(name), 1.0, system)
     unit = UNITS[name].replace("exponent", "$p$").replace("^$p$", "$^p$")
     assert label.endswith(f"({unit})") is (unit != "1")
     assert label.split(" (")[0]
+    turning = replace(system, rotations=frozenset({"tip", "slide"}))
+    _, told = _scale_and_label(Parameter(name), 1.0, turning)
+    assert told == label.replace(f"({unit})", f"({OF_ROTATIONS.get(unit, unit)})")
 
 
 def test_orbit_shows_displacement_impacts_and_force():

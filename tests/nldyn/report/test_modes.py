@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +12,12 @@ import cms
 import fem.render
 from fem.render.views import axes_of_view
 from nldyn.app.cli import main
+from nldyn.app.describe import described_as_json
 from nldyn.base.resources import example
 from nldyn.report.modes import mode_table
 from nldyn.scene.build import Structure
 from nldyn.scene.read import load_scene
+from nldyn.system.system import System
 
 BEAM = example("four_dof_xi_0.01.toml")
 
@@ -87,6 +90,17 @@ def test_check_and_run_tell_numbers_as_json(tmp_path):
     assert told["special_points"] == {"PD": 1} and told["branches"][0]["special_points"] == 1
     kept = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert {name: told[name] for name in kept} == kept
+
+
+def test_flexibilities_of_rotations_are_in_rad_for_a_moment():
+    """A key of their own: no number stands under a unit that is not its own."""
+    stiffness = np.diag([50.0, 200.0])
+    vectors = {"tip": [1.0, 0.0], "joint": [0.0, 1.0]}
+    system = System.from_matrices(np.eye(2), stiffness, vectors)
+    system = replace(system, rotations=frozenset({"joint"}))
+    told = described_as_json(system)
+    assert told["static_flexibility_m_per_n"] == {"tip": pytest.approx(0.02)}
+    assert told["static_flexibility_rad_per_n_m"] == {"joint": pytest.approx(0.005)}
 
 
 @pytest.mark.parametrize("view", fem.render.VIEWS)

@@ -163,7 +163,7 @@ def test_values_to_go_over_are_those_of_a_continuation(tmp_path, text, more, fau
     ("text", "more", "fault"),
     [
         (LINEAR, ("--x", "place:x"), "'place:x' is neither displacement:INTERFACE nor velocity"),
-        (LINEAR, ("--x", "displacement:y"), "value for '--x': 'y' is not an interface; known"),
+        (LINEAR, ("--x", "displacement:y"), "nldyn: 'y' is not an interface; known: 'x' (--x)"),
         (LINEAR, ("--x", "velocity:x"), "the velocity of 'x' moves with that of 'x'"),
         (LINEAR, ("--x-range", "1", "-1"), "x_range must be two ascending numbers"),
         (LINEAR.replace("0.2", "0.0"), (), "a system without damping has no attractors"),
