@@ -83,7 +83,8 @@ class ExactOrbit:
         What each excitation period gives.
     correction : float
         Length of the Newton step that led there, relative to the orbit: the error of the orbit
-        that it came from.
+        that it came from. The orbit is as long as the states at all its nodes: the one at phase
+        zero alone may be any share of it.
     """
 
     periods: list[ExactEnd]
@@ -109,10 +110,11 @@ def newton_step(orbit: Orbit, precision: Precision = DIGITS) -> tuple[Number, li
     problem, system = orbit.problem, orbit.system
     omega = mp.exp(mp.mpf(float(orbit.point[-1])))
     each = problem.segments // problem.period
-    nodes = problem.flow.to_modal(problem.nodes(orbit.point)[::each])
+    whole = problem.flow.to_modal(problem.nodes(orbit.point))
+    nodes = whole[::each]
     starts: list[Series] = [[mp.mpf(float(x)) for x in node] for node in nodes]
     moves = newton_steps(starts, [exact_end(system, s, omega, precision) for s in starts])
-    correction = length(problem.flow, moves) / length(problem.flow, starts)
+    correction = length(problem.flow, moves) / length(problem.flow, [*map(list, whole)])
     moved = [[x + d for x, d in zip(s, m, strict=True)] for s, m in zip(starts, moves, strict=True)]
     return omega, moved, correction
 
