@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,7 +42,7 @@ from nldyn.runtime.prefetch import Ahead, computing_ahead
 from nldyn.runtime.progress import Progress, shows_progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.collector import Collector, counted
-from nldyn.search.outlook import Outlook
+from nldyn.search.outlook import CONTACT, SEARCH, Outlook
 from nldyn.system.chart import FREQUENCY, THE_FREQUENCY, Chart, label_of, moves_frequency
 from nldyn.system.equilibrium import at_rest, rest
 from nldyn.system.parameters import Parameter
@@ -346,12 +347,13 @@ def diagram(
     box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, axis)
     with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
         effort, whole = _effort(box, search, search_points, wanted)
-        box.outlook = Outlook(wanted, search_points if wanted else 0, len(seeds))
         places = axis.middles(search_points)[::-1] if wanted else []
+        again = MORE_STARTS if whole and _contact_is_missing(box) else 0
+        box.outlook = Outlook(wanted, len(places), len(seeds), again)
         _search(box, places, wanted, effort)
-        if places and whole and _contact_is_missing(box):
-            more = replace(effort, starts=MORE_STARTS * effort.starts, seed=effort.seed + 1)
-            _search(box, places, wanted, more)
+        if places and again and _contact_is_missing(box):
+            more = replace(effort, starts=again * effort.starts, seed=effort.seed + 1)
+            _search(box, places, wanted, more, CONTACT)
         _follow_seeds(box, seeds, effort)
         _follow_branch_points(box)
         _follow_flips_of_new(box, wanted, doublings)
@@ -418,10 +420,14 @@ def _note_missing(box: Collector, wanted: Sequence[int], search_points: int) -> 
 
 
 def _search(
-    box: Collector, values: Sequence[float], periods: Sequence[int], effort: OrbitSearchOptions
+    box: Collector,
+    values: Sequence[float],
+    periods: Sequence[int],
+    effort: OrbitSearchOptions,
+    part: str = SEARCH,
 ) -> None:
     """Follow what simulations at some values come near, one period after the other."""
-    found = _searched(box, values, periods, effort)
+    found = _searched(box, values, periods, effort, part)
     for value, (failures, _) in zip(values, found, strict=True):
         _note_failures(box, value, failures, effort)
     for period in periods:
@@ -438,7 +444,11 @@ def _search(
 
 
 def _searched(
-    box: Collector, values: Sequence[float], periods: Sequence[int], effort: OrbitSearchOptions
+    box: Collector,
+    values: Sequence[float],
+    periods: Sequence[int],
+    effort: OrbitSearchOptions,
+    part: str,
 ) -> list[Found]:
     """What simulations at some values come near, on all processes."""
     ahead = box.ahead or Ahead(box.flow)
@@ -446,16 +456,18 @@ def _searched(
     counts = Counter({period: int(box.outlook.reached[f"1/{period}"]) for period in periods})
 
     def told(done: int, found: Found) -> None:
-        box.outlook.searched([box.at(value).frequency_hz for value in values], done)
+        box.outlook.searched(part, [box.at(value).frequency_hz for value in values], done)
+        if part == SEARCH and any(map(_touches, chain(*found[1].values()))):
+            box.outlook.touched()
         box.done = box.outlook.done
         for period, orbits in found[1].items():
             counts[period] += len(orbits)
             if done > 1:
                 box.outlook.found(period, counts[period] * len(values) / done)
-        box.tell("search", values[done - 1])
+        box.tell(part, values[done - 1])
 
     if values:
-        box.tell("search", values[0])
+        box.tell(part, values[0])
     arguments = [(box.axis, value, tuple(periods), box.observe, effort) for value in values]
     keys = [("search", *given) for given in arguments]
     return ahead.values(keys, search_at, arguments, told)
@@ -527,9 +539,12 @@ def shortened(
 def _contact_is_missing(box: Collector) -> bool:
     """Whether all stops are open at rest, and no orbit found touches one."""
     orbits = (orbit for branch in box.branches for orbit in branch.points)
-    return reach(box.flow.system) > 0.0 and not any(
-        orbit.impacts or orbit.max_penetration > 0.0 for orbit in orbits
-    )
+    return reach(box.flow.system) > 0.0 and not any(map(_touches, orbits))
+
+
+def _touches(orbit: Orbit) -> bool:
+    """Whether an orbit touches a stop."""
+    return orbit.impacts > 0 or orbit.max_penetration > 0.0
 
 
 def _follow_seeds(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+SEARCH, CONTACT = "search", "search for contact"
+
 # What follows a search, in units of the search at one frequency, found with the examples: so long
 # it takes to follow the branch of an orbit that was found, or of a flip; many have the same one.
 ONE_HARMONIC_ORBIT, ONE_ORBIT, ONE_DOUBLED_ORBIT = 0.4, 0.9, 0.1
@@ -26,6 +28,9 @@ class Outlook:
         Frequencies searched.
     seeds : int
         Further searches.
+    again : float
+        How much longer than the search another one is, which looks for orbits with contact unless
+        one is found before.
 
     Examples
     --------
@@ -39,12 +44,14 @@ class Outlook:
     periods: Sequence[int] = ()
     places: int = 0
     seeds: int = 0
+    again: float = 0.0
     weights: dict[str, float] = field(default_factory=dict)
     counts: dict[str, float] = field(default_factory=dict)
     reached: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._weigh("search", 1.0, self.places)
+        self._weigh(SEARCH, 1.0, self.places)
+        self._weigh(CONTACT, self.again, self.places)
         self._weigh("seeds", ONE_SEED, self.seeds)
         for period in self.periods:
             self._weigh(f"1/{period}", self._one_orbit(period), 0.0)
@@ -84,10 +91,14 @@ class Outlook:
         self.reached[part] = min(self.reached.get(part, 0.0), count)
         return part
 
-    def searched(self, frequencies: Sequence[float], done: int) -> None:
+    def searched(self, part: str, frequencies: Sequence[float], done: int) -> None:
         """So many of the frequencies are searched; lower ones, with more contacts, take longer."""
         times = [hz**-0.5 for hz in frequencies]
-        self.reach("search", self.places * sum(times[:done]) / sum(times))
+        self.reach(part, self.places * sum(times[:done]) / sum(times))
+
+    def touched(self) -> None:
+        """An orbit with contact is found, so that there is no search for one."""
+        self.counts[CONTACT] = self.reached[CONTACT]
 
     def reach(self, part: str, count: float) -> None:
         """So much of a part is done."""

@@ -247,6 +247,25 @@ def test_stop_that_nothing_touches_is_told():
     assert diagram(rigid, (0.26, 0.28), [1], search_points=1).notes == ()
 
 
+def test_what_is_done_counts_a_search_for_contact_until_contact_is_found():
+    """It comes last where no stop is in reach: all is done then, and not before."""
+    for gap, last in ((1.0, "search for contact"), (1e-7, "1/1")):
+        told = []
+        system = System.from_modal(
+            [13.1], {"m": [0.635]}, modal_damping=0.1, stops=[Stop("m", 5e6, gap=gap)],
+            excitation=[Unbalance("m", 4.92e-6)],
+        )  # fmt: skip
+        diagram(
+            system, (10.0, 12.0), [1], search_points=3, search=OrbitSearchOptions(starts=1),
+            progress=lambda what, _, done, told=told: told.append((what, done)),
+        )  # fmt: skip
+        stages = [what for what, _ in told]
+        assert stages[-1] == last and (last == "1/1") is ("search for contact" not in stages)
+        done = [share for what, share in told if what == stages[-1]]
+        assert done == sorted(done) and done[0] < 0.75 and max(done) <= 1.0
+
+
+
 def test_a_diagram_as_one_table(harmonic_branch):
     """Rows of all branches below each other, in pandas and xarray."""
     pytest.importorskip("pandas")
