@@ -752,7 +752,12 @@ def render(
     help="Joined components whose modes are varied, the others as in the scene; by default "
     "all that have a [reduction].",
 )
-@click.option("--at-hz", type=click.FloatRange(1e-6, 1e12), metavar="HZ", help="Orbit to compare.")
+@click.option(
+    "--at",
+    type=float,
+    metavar="VALUE",
+    help="Orbit to compare: its frequency in Hz, or value of what [continuation] changes.",
+)
 @click.option("--full", is_flag=True, help="Find this orbit in the full model, too (minutes).")
 @jobs_option
 def converge(
@@ -762,7 +767,7 @@ def converge(
     refinements: list[int] | None,
     meshes: str | None,
     components: str | None,
-    at_hz: float | None,
+    at: float | None,
     full: bool,
     jobs: int,
 ) -> Told:
@@ -776,7 +781,7 @@ def converge(
     scene, out = work.scene, work.out
     study = convergence_study_of(
         scene, modes=modes, methods=_names(methods), refinements=refinements or [1],
-        meshes=_names(meshes), components=_names(components), at_hz=at_hz, full=full,
+        meshes=_names(meshes), components=_names(components), at=at, full=full,
         progress=work.line, jobs=jobs,
     )  # fmt: skip
     write_study(study, out, scene.title, scene.text)

@@ -53,15 +53,15 @@ def check_frequency(name: str, value: object) -> None:
         )
 
 
-def check_range(range_hz: tuple[float, float]) -> tuple[float, float]:
+def check_range(range_hz: tuple[float, float], name: str = "range_hz") -> tuple[float, float]:
     """A frequency range as two floats, or a SystemModelError that says what is wrong."""
-    ends = numbers("range_hz", range_hz)
+    ends = numbers(name, range_hz)
     if ends.shape != (2,):
-        raise SystemModelError(f"range_hz must be two frequencies, got {shown(range_hz)}")
+        raise SystemModelError(f"{name} must be two frequencies, got {shown(range_hz)}")
     low, high = ends.tolist()
     if not SMALLEST_FREQUENCY <= low < high <= LARGEST_FREQUENCY:
         raise SystemModelError(
-            f"range_hz must be two positive frequencies, ascending, from {SMALLEST_FREQUENCY:g} "
+            f"{name} must be two positive frequencies, ascending, from {SMALLEST_FREQUENCY:g} "
             f"to {LARGEST_FREQUENCY:g}; got ({low:g}, {high:g})"
         )
     return low, high

@@ -160,6 +160,12 @@ class Axis:
             return value * (1.0 + share)
         return value + share * (self.chart.high - self.chart.low)
 
+    def apart(self, a: float, b: float) -> float:
+        """How far a value lies from another one, over this, or over the range's width."""
+        if self.chart.logarithmic:
+            return abs(a / b - 1.0)
+        return abs(a - b) / (self.chart.high - self.chart.low)
+
     def around(self, value: float, share: float) -> tuple[float, float]:
         """The values a share, as in `moved`, on either side of one."""
         if self.chart.logarithmic:

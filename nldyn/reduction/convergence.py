@@ -10,6 +10,7 @@ import numpy as np
 
 import cms
 from nldyn.base.errors import SystemModelError
+from nldyn.orbits.axis import Axis
 from nldyn.reduction.load_case import LoadCase
 from nldyn.reduction.model_errors import (
     BRANCH_QUANTITIES,
@@ -47,7 +48,7 @@ METHODS = ("rubin", "craig-bampton", "guyan", "truncation", "macneal")
 QUANTITIES = {
     "eigenfrequency": "eigenfrequencies",
     "receptance": "receptance",
-    "peak_hz": "peak frequency",
+    "peak_at": "peak position",
     "peak_height": "peak height",
     "fold_flip": "folds and flips",
     "force": "contact force",
@@ -64,8 +65,10 @@ class ConvergenceStudy:
     ----------
     setting : LoadCase
         What was asked.
-    at_hz : float
-        Frequency of the orbits that are compared.
+    at : float
+        Frequency in Hz, or value of the parameter, of the orbits that are compared.
+    axis : Axis
+        What changes, over which range.
     models : tuple of Measured
         All models, the reference last.
     errors : tuple of Errors
@@ -81,7 +84,8 @@ class ConvergenceStudy:
     """
 
     setting: LoadCase
-    at_hz: float
+    at: float
+    axis: Axis
     models: tuple[Measured, ...]
     errors: tuple[Errors, ...]
     best: Measured
@@ -89,8 +93,9 @@ class ConvergenceStudy:
     counted: str = ""
 
     def __repr__(self) -> str:
-        """One line: how many models, and at which frequency their orbits are compared."""
-        return f"<ConvergenceStudy of {len(self.models)} models, orbits at {self.at_hz:.6g} Hz>"
+        """One line: how many models, and where their orbits are compared."""
+        place = self.axis.told(self.at)
+        return f"<ConvergenceStudy of {len(self.models)} models, orbits at {place}>"
 
     @property
     def reference(self) -> Measured:
@@ -145,7 +150,7 @@ class ConvergenceStudy:
 
     def report(self) -> str:
         """The study as a table and a few sentences."""
-        head = ("label", "dofs", "modes", "size", "eigenf.", "recept.", "peak Hz", "peak m",
+        head = ("label", "dofs", "modes", "size", "eigenf.", "recept.", "peak at", "peak m",
                 "LP/PD", "lacks", "extra", "force", "contact", "ms/orbit", "branch s")  # fmt: skip
         rows: list[tuple[str, ...]] = [head]
         for index, (model, error) in enumerate(zip(self.models, self.errors, strict=True)):
@@ -163,9 +168,8 @@ class ConvergenceStudy:
         lines.append(self.said_of_references())
         known = self.reference.orbit or self.best.orbit
         if known is not None and largest_force(known) == 0.0:
-            lines.append(
-                f"no stop is touched at {self.at_hz:g} Hz, so that there is no contact to compare"
-            )
+            place = self.axis.told(self.at)
+            lines.append(f"no stop is touched at {place}, so that there is no contact to compare")
         for label, indices in self.series().items():
             if len(indices) > 1:
                 lines += self.said_of(label, indices, counted_modes)
@@ -202,7 +206,7 @@ class ConvergenceStudy:
         ]
 
     def _advised(self, label: str, indices: Sequence[int], tolerance: float) -> str:
-        whole = covers(self.best.spans_hz, self.setting.range_hz)
+        whole = covers(self.best.spans, self.axis.limits, self.axis)
         unsaid = ("eigenfrequency", *(() if whole else BRANCH_QUANTITIES))
         told = [
             quantity
@@ -215,7 +219,8 @@ class ConvergenceStudy:
         share = f"{100 * tolerance:g} %"
         unasked = ""
         if not whole:
-            covered, asked = map(spans_in_words, (self.best.spans_hz, [self.setting.range_hz]))
+            spans = (self.best.spans, [self.axis.limits])
+            covered, asked = (spans_in_words(each, self.axis) for each in spans)
             unasked = "; nothing on peaks, folds and flips, as the reference's branch covers "
             unasked += f"{covered} of {asked}"
         if lacking:
@@ -259,7 +264,7 @@ class ConvergenceStudy:
             own = f"how wrong {largest} is itself, only a study with more modes can say"
         return (
             f"reference: {self._whole()} for eigenfrequencies and receptance{orbit}, {largest} for "
-            f"the rest; orbits at {self.at_hz:g} Hz\n{own}"
+            f"the rest; orbits at {self.axis.told(self.at)}\n{own}"
             + (f"\n{self.counted}" if self.counted else "")
         )
 
@@ -309,7 +314,7 @@ class ConvergenceStudy:
         As for `enough`, the reference itself proves nothing unless it is exact.
         """
         found = None
-        followed = [index for index in indices if self.models[index].special_hz is not None]
+        followed = [index for index in indices if self.models[index].special_values is not None]
         for index in reversed(followed):
             if self.is_own_reference(index, "fold_flip"):
                 continue
@@ -326,7 +331,7 @@ def convergence_study(
     *,
     modes: Sequence[int] | None = None,
     methods: Sequence[str] = ("rubin",),
-    at_hz: float | None = None,
+    at: float | None = None,
     full: bool = False,
     progress: Progress | None = None,
     jobs: int = 1,
@@ -346,10 +351,11 @@ def convergence_study(
     methods : sequence of str
         Names as for `cms.reduce`. By "macneal" interfaces have no mass, so that there is no
         equation of motion with a stop: only the linear numbers are compared.
-    at_hz : float, optional
-        Frequency of the orbits that are compared; by default the geometric mean of the range.
+    at : float, optional
+        Frequency in Hz, or value of the parameter, of the orbits that are compared; by default the
+        geometric mean of the range, or its middle if that is not positive.
     full : bool
-        Also find the orbit at ``at_hz`` in the full model, with all modes that an interface can
+        Also find the orbit at ``at`` in the full model, with all modes that an interface can
         see, and compare with that; this takes minutes for some hundred modes.
     progress : callable, optional
         Called as ``progress(what, frequency_hz, done)``.
@@ -378,7 +384,7 @@ def convergence_study(
     therefore not that of the full model.
     The harmonic branch is followed downwards from the orbit that a simulation from rest finds at
     the upper end of the range. If it does not come to the lower end, the branch from there is
-    followed too, and then the one at ``at_hz`` if both leave that out. Peaks, folds and flips are
+    followed too, and then the one at ``at`` if both leave that out. Peaks, folds and flips are
     those of all these pieces; they are compared only where the pieces cover the same frequencies
     as those of the reference.
     """
@@ -389,9 +395,8 @@ def convergence_study(
     }
     if not studied or (modes is not None and not modes) or not methods:
         raise SystemModelError("converge: give at least one component, count and method")
-    at_hz = setting.middle_hz if at_hz is None else at_hz
-    if not setting.range_hz[0] <= at_hz <= setting.range_hz[1]:
-        raise SystemModelError(f"converge: at_hz must lie in the range, got {at_hz:g}")
+    if at is not None and not setting.limits[0] <= at <= setting.limits[1]:
+        raise SystemModelError(f"converge: at must lie in the range, got {at:g}")
     mesh, finest = list(studied.items())[-1]
     if full and finest.dofs > ALL_MODES_UP_TO:
         raise SystemModelError(
@@ -403,6 +408,8 @@ def convergence_study(
     if modes is None:
         wanted = [count for count in wanted if count >= known.fewest] or [max(wanted)]
     whole = known.whole
+    axis = setting.axis(setting.system(whole))
+    at = axis.between(*axis.limits, 0.5) if at is None else at
     linear = measured_linear("", FULL if known.full else REFERENCE, whole, setting)
     counts = sorted(set(wanted))
     cases = [
@@ -412,20 +419,20 @@ def convergence_study(
         for reduced in each.reductions(counts, method)
     ]
     shares = Shares(progress or silent, {str(k): _cost(case[1]) for k, case in enumerate(cases)})
-    models = _measured_all(cases, setting, at_hz, shares, jobs)
+    models = _measured_all(cases, setting, at, shares, jobs)
     best = best_of([model for model in models if model.mesh == mesh], linear)
     if full and best.orbit is not None:
         shares.weigh(FULL, 0.0)
         linear = with_orbit(linear, whole, setting, best.orbit, shares.part(FULL))
     elif full:
-        linear = replace(linear, note=f"no orbit at {at_hz:g} Hz: the largest model has none")
-    place, case = models.index(best), (setting.range_hz, at_hz)
-    models = [noted(m, best, linear.orbit if full else best.orbit, case) for m in models]
+        linear = replace(linear, note=f"no orbit at {axis.told(at)}: the largest model has none")
+    place, exact = models.index(best), linear.orbit if full else best.orbit
+    models = [noted(model, best, exact, axis, at) for model in models]
     best = models[place]
     models.append(linear)
-    errors = tuple(errors_of(model, linear, best, full) for model in models)
+    errors = tuple(errors_of(model, linear, best, full, axis) for model in models)
     error = 0.0 if known.full else receptance_bound(finest, known, linear, setting)
-    return ConvergenceStudy(setting, at_hz, tuple(models), errors, best, error, finest.counted)
+    return ConvergenceStudy(setting, at, axis, tuple(models), errors, best, error, finest.counted)
 
 
 def if_finite(number: float) -> str:
@@ -458,7 +465,7 @@ def _cost(reduced: cms.ReducedModel) -> float:
 def _measured_all(
     cases: Sequence[tuple[str, cms.ReducedModel]],
     setting: LoadCase,
-    at_hz: float,
+    at: float,
     shares: Shares,
     jobs: int,
 ) -> list[Measured]:
@@ -467,7 +474,7 @@ def _measured_all(
 
     def one(number: int) -> None:
         name, reduced = cases[number]
-        models[number] = measured(name, reduced, setting, at_hz, shares.part(str(number)))
+        models[number] = measured(name, reduced, setting, at, shares.part(str(number)))
         shares.end(str(number))
 
     if cases:
@@ -477,7 +484,7 @@ def _measured_all(
             for number in range(1, len(cases)):
                 one(number)
         else:
-            task = partial(_measured_case, setting, at_hz)
+            task = partial(_measured_case, setting, at)
             for outcome in as_finished(task, cases[1:], pool):
                 number = outcome.index + 1
                 if outcome.value is None:
@@ -488,7 +495,7 @@ def _measured_all(
     return [models[number] for number in range(len(cases))]
 
 
-def _measured_case(setting: LoadCase, at_hz: float, case: tuple[str, cms.ReducedModel]) -> Measured:
+def _measured_case(setting: LoadCase, at: float, case: tuple[str, cms.ReducedModel]) -> Measured:
     """As `measured`, in another process."""
     with one_thread():
-        return measured(*case, setting, at_hz)
+        return measured(*case, setting, at)

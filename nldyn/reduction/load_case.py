@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from nldyn.base.errors import SystemModelError, check_range
+from nldyn.base.errors import SystemModelError, check_frequency, check_range
+from nldyn.orbits.axis import Axis
 from nldyn.system.loads import Excitation
+from nldyn.system.parameters import Parameter
 from nldyn.system.stop import Stop
 from nldyn.system.system import AnyDamper, AnySpring, System
 
@@ -21,8 +22,8 @@ class LoadCase:
 
     Parameters
     ----------
-    range_hz : (float, float)
-        Excitation frequencies of interest.
+    limits : (float, float)
+        Excitation frequencies of interest in Hz, or values of the parameter.
     stops, dampers, excitation : tuples
         What acts at the interfaces.
     modal_damping : float
@@ -35,6 +36,11 @@ class LoadCase:
         Springs at the interfaces.
     rotations : set of str
         The interfaces that turn: their displacements are in rad.
+    parameter : str or Parameter, optional
+        What changes, the excitation frequency unless given: see
+        `nldyn.system.chart.checked_parameter`.
+    frequency_hz : float, optional
+        Excitation frequency in Hz, held where another parameter changes.
 
     Raises
     ------
@@ -48,7 +54,7 @@ class LoadCase:
     0.0
     """
 
-    range_hz: tuple[float, float]
+    limits: tuple[float, float]
     stops: tuple[Stop, ...] = ()
     dampers: tuple[AnyDamper, ...] = ()
     excitation: tuple[Excitation, ...] = ()
@@ -57,16 +63,35 @@ class LoadCase:
     rayleigh: tuple[float, float] = (0.0, 0.0)
     springs: tuple[AnySpring, ...] = ()
     rotations: frozenset[str] = frozenset()
+    parameter: str | Parameter | None = None
+    frequency_hz: float | None = None
 
     def __post_init__(self) -> None:
-        check_range(self.range_hz)
+        if self.parameter is None:
+            check_range(self.limits, "limits")
+        elif self.frequency_hz is None:
+            name = getattr(self.parameter, "name", self.parameter)
+            raise SystemModelError(f"parameter '{name}': needs frequency_hz, which is held")
+        else:
+            check_frequency("frequency_hz", self.frequency_hz)
         if not self.excitation:
             raise SystemModelError("the setting has no excitation: nothing moves the structure")
 
     @property
-    def middle_hz(self) -> float:
-        """Geometric mean of the range."""
-        return math.sqrt(self.range_hz[0] * self.range_hz[1])
+    def range_hz(self) -> tuple[float, float]:
+        """Lowest and highest excitation frequency in Hz, which are one where it is held."""
+        hz = self.frequency_hz
+        return self.limits if hz is None else (hz, hz)
+
+    def axis(self, system: System) -> Axis:
+        """What changes, of a system.
+
+        Raises
+        ------
+        SystemModelError
+            If the system has no such parameter, or it cannot have these values.
+        """
+        return Axis.of(system, self.limits, self.parameter, self.frequency_hz)
 
     def system(self, reduced: cms.ReducedModel) -> System:
         """The system that a reduced model makes of it, the observed interface first.

@@ -17,15 +17,16 @@ from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import continue_branch, open_ends
 from nldyn.branches.peaks import resonance_peaks
 from nldyn.flow.flow_map import FlowMap
+from nldyn.orbits.axis import Axis
 from nldyn.orbits.newton import refine
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
 from nldyn.reduction.load_case import LoadCase
 from nldyn.runtime.progress import Progress, silent
+from nldyn.system.chart import with_unit
 from nldyn.system.springs_dampers import Damper, Spring
 from nldyn.system.system import System
 
-Case = tuple[tuple[float, float], float]  # range and frequency of a study in Hz
 GRID = 400
 LONGEST_SEARCH = 600.0  # s of processor time for the orbit with which a harmonic branch begins
 EIGENFREQUENCIES = 3
@@ -34,7 +35,7 @@ MATCH = 0.02  # special points of one kind farther apart are not the same
 FEWEST_REFERENCE_MODES = 40
 MASSLESS = "its interfaces have no mass, so that a stop has no equation of motion"
 MOVED = 1.001  # times an orbit: the start from which the time of Newton's method is measured
-BRANCH_QUANTITIES = ("peak_hz", "peak_height", "fold_flip")  # errors that need the whole range
+BRANCH_QUANTITIES = ("peak_at", "peak_height", "fold_flip")  # errors that need the whole range
 VISIBLE = 1e-6  # of the largest displacement at an interface: that of a mode which is seen there
 
 
@@ -54,18 +55,19 @@ class Measured:
         Linear receptance at the observed interface over the range, with all dampers, m/N.
     peak : Orbit or None
         Orbit at the top of the highest resonance peak of the harmonic branch.
-    special_hz : dict of str to tuple
-        Frequencies of the folds (LP) and flips (PD) of the harmonic branch.
+    special_values : dict of str to tuple
+        Frequencies in Hz of the folds (LP) and flips (PD) of the harmonic branch, or values of the
+        parameter.
     orbit : Orbit or None
-        Harmonic orbit at the frequency of the study.
+        Harmonic orbit at the frequency or value of the study.
     seconds_per_orbit : float
         Time to find that orbit again from a guess 0.1 % off, the shortest of nine.
     seconds : float
         Time for the branch.
     note : str
         What could not be computed.
-    spans_hz : tuple of (float, float)
-        Frequencies that the pieces of the harmonic branch cover, ascending and apart.
+    spans : tuple of (float, float)
+        Values that the pieces of the harmonic branch cover, ascending and apart.
     """
 
     mesh: str
@@ -76,12 +78,12 @@ class Measured:
     frequencies_hz: Real
     receptance: Complex
     peak: Orbit | None
-    special_hz: Mapping[str, tuple[float, ...]] | None
+    special_values: Mapping[str, tuple[float, ...]] | None
     orbit: Orbit | None
     seconds_per_orbit: float
     seconds: float
     note: str = ""
-    spans_hz: tuple[tuple[float, float], ...] = ()
+    spans: tuple[tuple[float, float], ...] = ()
 
     @property
     def label(self) -> str:
@@ -97,7 +99,8 @@ class Measured:
 class Errors:
     """Relative errors of one model against the reference; nan where a number is missing.
 
-    Peaks, folds and flips are compared only if both branches cover the same frequencies.
+    Peaks, folds and flips are compared only if both branches cover the same range. Where a range
+    is not positive, values are compared over its width.
 
     Parameters
     ----------
@@ -105,22 +108,22 @@ class Errors:
         Largest of the first three that an interface sees, or of as many as the model has.
     receptance : float
         ``norm(H - H_ref) / norm(H_ref)`` over the range.
-    peak_hz, peak_height : float
-        Frequency and height of the highest resonance peak.
+    peak_at, peak_height : float
+        Place, in Hz or as the value of the parameter, and height of the highest peak.
     fold_flip : float
-        Largest error of a fold's or flip's frequency, of those that both models have; nan if there
+        Largest error of a fold's or flip's place, of those that both models have; nan if there
         are none.
     counts : (int, int) or None
         Folds and flips of the reference that the model lacks, and the other way round; None if
-        it has no branch, or one that covers other frequencies.
+        it has no branch, or one that covers another range.
     force, contact : float
-        Largest contact force and whole contact time per period of the orbit at the frequency of
-        the study.
+        Largest contact force and whole contact time per period of the orbit at the frequency or
+        value of the study.
     """
 
     eigenfrequency: float
     receptance: float
-    peak_hz: float
+    peak_at: float
     peak_height: float
     fold_flip: float
     counts: tuple[int, int] | None
@@ -142,7 +145,7 @@ def most_modes(component: cms.ComponentLike, methods: Sequence[str]) -> int:
 
 def best_of(models: Sequence[Measured], full: Measured) -> Measured:
     """Of the models whose branch was followed the largest, of several that with least error."""
-    followed = [model for model in models if model.special_hz is not None]
+    followed = [model for model in models if model.special_values is not None]
     if not followed:
         raise ConvergenceError("no model of the study has a harmonic branch: " + models[-1].note)
     return min(followed, key=lambda m: (-m.size, distance(m.receptance, full.receptance)))
@@ -152,7 +155,7 @@ def measured(
     mesh: str,
     reduced: cms.ReducedModel,
     setting: LoadCase,
-    at_hz: float,
+    at: float,
     progress: Progress = silent,
 ) -> Measured:
     """Compute what a `ConvergenceStudy` compares for one reduced model."""
@@ -162,22 +165,23 @@ def measured(
     start = time.perf_counter()
     try:
         what = f"{linear.label}, {counted_modes(linear)}"
-        tell = told(progress, what, setting.range_hz)
-        pieces, notes = harmonic_pieces(setting.system(reduced), setting, at_hz, tell)
+        system = setting.system(reduced)
+        axis = setting.axis(system)
+        pieces, notes = harmonic_pieces(system, setting, at, told(progress, what, axis))
     except ConvergenceError as error:
         return replace(linear, note=str(error))
     seconds = time.perf_counter() - start
     peaks = [peak for piece in pieces for peak in resonance_peaks(piece)]
-    orbits = [orbit for piece in pieces for orbit in piece.at(at_hz)]
+    orbits = [orbit for piece in pieces for orbit in piece.at(at)]
     return replace(
         linear,
         peak=max(peaks, key=lambda p: p.height).orbit if peaks else None,
-        special_hz=special_points_of(pieces),
+        special_values=special_points_of(pieces),
         orbit=orbits[0] if orbits else None,
         seconds_per_orbit=seconds_per_orbit(orbits[0]) if orbits else np.nan,
         seconds=seconds,
         note="; ".join(dict.fromkeys([note for piece in pieces for note in piece.notes] + notes)),
-        spans_hz=merged(piece.span_hz for piece in pieces),
+        spans=merged((piece.span for piece in pieces), axis),
     )
 
 
@@ -196,7 +200,7 @@ def measured_linear(
         frequencies_hz=np.sort(reduced.frequencies_hz[seen]),
         receptance=receptance(reduced, setting, np.linspace(*setting.range_hz, GRID)),
         peak=None,
-        special_hz=None,
+        special_values=None,
         orbit=None,
         seconds_per_orbit=np.nan,
         seconds=np.nan,
@@ -236,7 +240,9 @@ def with_orbit(
     """The full model with its orbit, found from that of a reduced one."""
     progress(f"full model, {reduced.size} modes", guess.frequency_hz, 0.0)
     try:
-        orbit = transferred(guess, setting.system(reduced))
+        system = setting.system(reduced)
+        axis = setting.axis(system)
+        orbit = transferred(guess, axis.at(FlowMap(system), axis.value(guess)).flow.system)
     except ConvergenceError as error:
         return replace(model, note=str(error))
     return replace(model, orbit=orbit, seconds_per_orbit=seconds_per_orbit(orbit, repeats=1))
@@ -321,51 +327,64 @@ def massless_receptance(
 
 def harmonic_branch(system: System, setting: LoadCase, tell: Callable[[float], None]) -> Branch:
     """The harmonic branch downwards from the upper end of the range."""
-    low, high = setting.range_hz
+    axis = setting.axis(system)
+    _, high = axis.limits
     tell(high)
     try:
-        orbit = solve_orbit(
-            FlowMap(system), high * (1.0 - SLACK), observe=setting.observe, seconds=LONGEST_SEARCH
-        )
+        orbit = _orbit_at(axis, system, axis.moved(high, -SLACK), setting)
     except ConvergenceError as error:
         rigid = system.free_modes
         if not rigid:
             raise
         modes = f"{rigid} mode{'' if rigid == 1 else 's'} at 0 Hz"
         raise ConvergenceError(f"{error}; nothing holds the structure: it has {modes}") from None
-    return continue_branch(orbit, (low, high), progress=tell)
+    return continue_branch(orbit, axis.limits, parameter=axis.parameter, progress=tell)
+
+
+def _orbit_at(axis: Axis, system: System, value: float, setting: LoadCase) -> Orbit:
+    """The harmonic orbit at a value of what changes.
+
+    Raises
+    ------
+    ConvergenceError
+        If none is found.
+    """
+    here = axis.at(FlowMap(system), value)
+    return solve_orbit(
+        here.flow, here.frequency_hz, observe=setting.observe, seconds=LONGEST_SEARCH
+    )
 
 
 def harmonic_pieces(
-    system: System, setting: LoadCase, at_hz: float, tell: Callable[[float], None]
+    system: System, setting: LoadCase, at: float, tell: Callable[[float], None]
 ) -> tuple[list[Branch], list[str]]:
     """The harmonic branch from the upper end of the range, and what it leaves out.
 
     If it does not come to the lower end, also the branch from there; if both leave out the
-    frequency of the study, also the one through the orbit there. With notes on starts without an
+    place of the study, also the one through the orbit there. With notes on starts without an
     orbit.
     """
     pieces, notes = [harmonic_branch(system, setting, tell)], []
-    low, _ = setting.range_hz
-    reached, _ = pieces[0].span_hz
+    axis = setting.axis(system)
+    low, _ = axis.limits
+    reached, _ = pieces[0].span
 
     def still(_: float) -> None:
         tell(reached)
 
-    for hz in (low * (1.0 + SLACK), at_hz):
-        if covers([piece.span_hz for piece in pieces], (hz, hz)):
+    for value in (axis.moved(low, SLACK), at):
+        if covers([piece.span for piece in pieces], (value, value), axis):
             continue
         try:
-            orbit = solve_orbit(
-                FlowMap(system), hz, observe=setting.observe, seconds=LONGEST_SEARCH
-            )
+            orbit = _orbit_at(axis, system, value, setting)
         except ConvergenceError as error:
-            notes.append(f"a branch through {hz:g} Hz is missing: {error}")
+            notes.append(f"a branch through {axis.told(value)} is missing: {error}")
             continue
         pieces.append(
             continue_branch(
                 orbit,
-                setting.range_hz,
+                axis.limits,
+                parameter=axis.parameter,
                 progress=still,
                 open_ends=[end for piece in pieces for end in open_ends(piece)],
             )
@@ -373,56 +392,66 @@ def harmonic_pieces(
     return pieces, notes
 
 
-def merged(spans_hz: Iterable[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+def merged(spans: Iterable[tuple[float, float]], axis: Axis) -> tuple[tuple[float, float], ...]:
     """Spans that overlap made one, ascending.
 
     Examples
     --------
-    >>> merged([(5.0, 8.0), (1.0, 2.0), (7.0, 9.0)])
+    >>> merged([(5.0, 8.0), (1.0, 2.0), (7.0, 9.0)], Axis.in_frequency((1.0, 9.0)))
     ((1.0, 2.0), (5.0, 9.0))
     """
     found: list[tuple[float, float]] = []
-    for low, high in sorted(spans_hz):
-        if found and low <= found[-1][1] * (1.0 + SLACK):
+    for low, high in sorted(spans):
+        if found and _reaches(found[-1][1], low, SLACK, axis):
             low, high = found[-1][0], max(found.pop()[1], high)
         found.append((low, high))
     return tuple(found)
 
 
 def covers(
-    spans_hz: Sequence[tuple[float, float]], wanted: tuple[float, float], slack: float = SLACK
+    spans: Sequence[tuple[float, float]],
+    wanted: tuple[float, float],
+    axis: Axis,
+    slack: float = SLACK,
 ) -> bool:
-    """Whether one of some spans holds another span, up to a relative difference.
+    """Whether one of some spans holds another span, up to a difference as in `Axis.apart`.
 
     Examples
     --------
-    >>> covers([(1.0, 2.0), (5.0, 9.0)], (5.0, 8.0)), covers([(1.0, 2.0), (5.0, 9.0)], (2.0, 5.0))
+    >>> spans, axis = [(1.0, 2.0), (5.0, 9.0)], Axis.in_frequency((1.0, 9.0))
+    >>> covers(spans, (5.0, 8.0), axis), covers(spans, (2.0, 5.0), axis)
     (True, False)
     """
     return any(
-        low <= wanted[0] * (1.0 + slack) and wanted[1] * (1.0 - slack) <= high
-        for low, high in spans_hz
+        _reaches(wanted[0], low, slack, axis) and _reaches(high, wanted[1], slack, axis)
+        for low, high in spans
     )
 
 
-def alike_spans(a: Measured, b: Measured) -> bool:
-    """Whether the branches of two models cover the same frequencies, up to 2 %."""
-    pairs = [(a, span) for span in b.spans_hz] + [(b, span) for span in a.spans_hz]
-    return all(covers(model.spans_hz, span, MATCH) for model, span in pairs)
+def _reaches(value: float, other: float, slack: float, axis: Axis) -> bool:
+    """Whether a value is not below another one, up to a difference."""
+    return other <= value or axis.apart(other, value) <= slack
 
 
-def spans_in_words(spans_hz: Sequence[tuple[float, float]]) -> str:
+def alike_spans(a: Measured, b: Measured, axis: Axis) -> bool:
+    """Whether the branches of two models cover the same range, up to 2 %."""
+    pairs = [(a, span) for span in b.spans] + [(b, span) for span in a.spans]
+    return all(covers(model.spans, span, axis, MATCH) for model, span in pairs)
+
+
+def spans_in_words(spans: Sequence[tuple[float, float]], axis: Axis) -> str:
     """Spans as a list.
 
     Examples
     --------
-    >>> spans_in_words([(4.0, 4.04441), (11.7417, 12.0)])
+    >>> spans_in_words([(4.0, 4.04441), (11.7417, 12.0)], Axis.in_frequency((4.0, 12.0)))
     '4 to 4.0444 and 11.742 to 12 Hz'
     """
-    return " and ".join(f"{low:.5g} to {high:.5g}" for low, high in spans_hz) + " Hz"
+    listed = " and ".join(f"{low:.5g} to {high:.5g}" for low, high in spans)
+    return with_unit(axis.parameter, listed)
 
 
-def noted(model: Measured, best: Measured, exact: Orbit | None, case: Case) -> Measured:
+def noted(model: Measured, best: Measured, exact: Orbit | None, axis: Axis, at: float) -> Measured:
     """A model with notes on what of its branch and its contacts is not compared, and why.
 
     Parameters
@@ -431,36 +460,39 @@ def noted(model: Measured, best: Measured, exact: Orbit | None, case: Case) -> M
         The model, and that whose branch is the reference's.
     exact : Orbit or None
         The orbit of reference.
-    case : ((float, float), float)
-        Range and frequency of the study in Hz.
+    axis : Axis
+        What changes, and its range.
+    at : float
+        Value at which orbits are compared.
     """
-    if model.special_hz is None:
+    if model.special_values is None:
         return model
-    range_hz, at_hz = case
     notes = [model.note] if model.note else []
-    alike = alike_spans(model, best)
-    if not (alike and covers(model.spans_hz, range_hz)):
-        said = f"the branch covers {spans_in_words(model.spans_hz)} of {spans_in_words([range_hz])}"
+    alike = alike_spans(model, best, axis)
+    if not (alike and covers(model.spans, axis.limits, axis)):
+        covered, asked = (spans_in_words(each, axis) for each in (model.spans, [axis.limits]))
+        said = f"the branch covers {covered} of {asked}"
         if not alike:
-            said += f", that of the reference {spans_in_words(best.spans_hz)}"
+            said += f", that of the reference {spans_in_words(best.spans, axis)}"
             said += ": peaks, folds and flips are not compared"
         notes.append(said)
     if model.orbit is None:
-        notes.append(f"no orbit of the branch at {at_hz:g} Hz, so that its contacts are unknown")
+        notes.append(f"no orbit of the branch at {axis.told(at)}, so that its contacts are unknown")
     elif exact is None:
-        notes.append(f"the reference has no orbit at {at_hz:g} Hz: contacts are not compared")
+        notes.append(f"the reference has no orbit at {axis.told(at)}: contacts are not compared")
     return replace(model, note="; ".join(notes))
 
 
-def told(progress: Progress, what: str, range_hz: tuple[float, float]) -> Callable[[float], None]:
+def told(progress: Progress, what: str, axis: Axis) -> Callable[[float], None]:
     """Tell how much of a range a branch covers that comes down from its upper end."""
-    low, high = range_hz
+    low, high = axis.limits
     lowest = high
 
-    def tell(frequency_hz: float) -> None:
+    def tell(value: float) -> None:
         nonlocal lowest
-        lowest = min(lowest, frequency_hz)
-        progress(what, frequency_hz, (high - lowest) / (high - low))
+        lowest = min(lowest, value)
+        hz = value if axis.frequency_hz is None else 0.0
+        progress(what, hz, (high - lowest) / (high - low))
 
     return tell
 
@@ -488,25 +520,30 @@ def largest_force(orbit: Orbit) -> float:
     )
 
 
-def errors_of(model: Measured, reference: Measured, best: Measured, full: bool) -> Errors:
+def errors_of(
+    model: Measured, reference: Measured, best: Measured, full: bool, axis: Axis
+) -> Errors:
     """Errors of a model: linear numbers against the reference, the branch's against ``best``.
 
     The orbit is compared with that of the full model if there is one.
     """
     eigenfrequency = frequency_error(model.frequencies_hz, reference.frequencies_hz)
     fold_flip, counts = np.nan, None
-    alike = alike_spans(model, best)
+    alike = alike_spans(model, best, axis)
     peak = model.peak if alike else None
-    if alike and model.special_hz is not None and best.special_hz is not None:
-        fold_flip, *lacking = matched(model.special_hz, best.special_hz)
+    if alike and model.special_values is not None and best.special_values is not None:
+        fold_flip, *lacking = matched(model.special_values, best.special_values, axis)
         counts = (lacking[0], lacking[1])
-        if lacking[0] == sum(map(len, best.special_hz.values())):
+        if lacking[0] == sum(map(len, best.special_values.values())):
             fold_flip = np.nan
     orbit = reference.orbit if full else best.orbit
+    moved = np.nan
+    if peak is not None and best.peak is not None:
+        moved = axis.apart(axis.value(peak), axis.value(best.peak))
     return Errors(
         eigenfrequency,
         distance(model.receptance, reference.receptance),
-        relative(peak, best.peak, lambda o: o.frequency_hz),
+        moved,
         relative(peak, best.peak, lambda o: o.max_abs_displacement),
         fold_flip,
         counts,
@@ -540,25 +577,25 @@ def relative(a: Orbit | None, b: Orbit | None, number: Callable[[Orbit], float])
 
 
 def special_points_of(pieces: Sequence[Branch]) -> dict[str, tuple[float, ...]]:
-    """Frequencies of the folds and flips of the pieces of a branch, by kind."""
+    """Values at the folds and flips of the pieces of a branch, by kind."""
     points = [point for piece in pieces for point in piece.special_points]
     return {
-        kind: tuple(sorted(p.frequency_hz for p in points if str(p.kind) == kind))
+        kind: tuple(sorted(p.value for p in points if str(p.kind) == kind))
         for kind in SPECIAL_KINDS
     }
 
 
 def matched(
-    own: Mapping[str, tuple[float, ...]], exact: Mapping[str, tuple[float, ...]]
+    own: Mapping[str, tuple[float, ...]], exact: Mapping[str, tuple[float, ...]], axis: Axis
 ) -> tuple[float, int, int]:
-    """Largest relative distance of special points that belong together, and how many do not.
+    """Largest distance, as in `Axis.apart`, of special points that belong together; the others.
 
     Points of one kind are paired nearest first, up to a distance of 2 %.
     """
     worst, missing, extra = 0.0, 0, 0
     for kind, wanted in exact.items():
         given = own.get(kind, ())
-        pairs = sorted((abs(g / w - 1.0), i, j) for i, w in enumerate(wanted)
+        pairs = sorted((axis.apart(g, w), i, j) for i, w in enumerate(wanted)
                        for j, g in enumerate(given))  # fmt: skip
         left, right = set(range(len(wanted))), set(range(len(given)))
         for distance, i, j in pairs:

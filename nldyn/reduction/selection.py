@@ -12,6 +12,7 @@ import cms
 from nldyn.base.errors import ConvergenceError, SystemModelError, is_finite, shown
 from nldyn.branches.branch import Branch
 from nldyn.branches.peaks import resonance_peaks
+from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.solve import solve_orbit
 from nldyn.reduction.candidates import BEYOND, Candidates, candidate_modes, share
@@ -150,7 +151,7 @@ def select_modes(
     component : ComponentLike
         As for `cms.reduce`.
     setting : LoadCase
-        What acts on it, and the frequency range.
+        What acts on it, and the range of frequencies or of another parameter.
     tolerance : float
         Largest relative change of the harmonic response that leaving modes out may make.
     special_points : bool
@@ -193,9 +194,10 @@ def select_modes(
     visible = candidate_modes(component, setting)
     whole, seen, cutoff = visible.whole, visible.seen, visible.cutoff_hz
     shares = Shares(progress or silent, {"reference": 3.0, "modes": 1.0})
-    tell = told(shares.part("reference"), "reference", setting.range_hz)
     reference = cms.keep_modes(whole, seen)
-    judge = Judge(setting, reference, harmonic_branch(setting.system(reference), setting, tell))
+    system = setting.system(reference)
+    tell = told(shares.part("reference"), "reference", setting.axis(system))
+    judge = Judge(setting, reference, harmonic_branch(system, setting, tell))
     candidates = visible.numbers
     shares.end("reference")
     kept, error = fewest_modes(visible, judge, tolerance, shares.part("modes"))
@@ -206,10 +208,10 @@ def select_modes(
     if special_points:
         for part in ("chosen model", "model up to the cut-off"):
             shares.weigh(part, 3.0)
-        tell = told(shares.part("chosen model"), "chosen model", setting.range_hz)
+        tell = told(shares.part("chosen model"), "chosen model", judge.axis)
         moved_by, missing, extra = judge.special_error(reduced, tell)
         shares.end("chosen model")
-        tell = told(shares.part("model up to the cut-off"), "cut-off", setting.range_hz)
+        tell = told(shares.part("model up to the cut-off"), "cut-off", judge.axis)
         uncertain, *lacking = judge.special_error(smaller, tell)
         special_error, doubtful = around(moved_by, uncertain), sum(lacking)
     return ModeSelection(
@@ -265,9 +267,9 @@ class Judge:
 
     def __init__(self, setting: LoadCase, reference: cms.ReducedModel, branch: Branch) -> None:
         self.setting, self.reference, self.branch = setting, reference, branch
-        low, high = setting.range_hz
-        places = np.geomspace(low, high, SAMPLES + 2)[1:-1]
-        self.orbits: list[Orbit] = [o for hz in places for o in branch.at(float(hz))[:1]]
+        self.axis = setting.axis(branch.points[0].system)
+        places = self.axis.spread(SAMPLES + 2)[1:-1]
+        self.orbits: list[Orbit] = [o for place in places for o in branch.at(float(place))[:1]]
         self.orbits += [
             p.orbit for p in sorted(resonance_peaks(branch), key=lambda p: -p.height)[:1]
         ]
@@ -284,7 +286,8 @@ class Judge:
         worst = 0.0
         for known in self.orbits:
             try:
-                orbit = moved(known, self.reference, model, system)
+                here = self.axis.at(FlowMap(system), self.axis.value(known)).flow.system
+                orbit = moved(known, self.reference, model, here)
             except ConvergenceError:
                 return math.inf
             size = known.max_abs_displacement
@@ -301,7 +304,7 @@ class Judge:
         if model is self.reference:
             return 0.0, 0, 0
         branch = harmonic_branch(self.setting.system(model), self.setting, tell)
-        return matched(special_points_of([branch]), special_points_of([self.branch]))
+        return matched(special_points_of([branch]), special_points_of([self.branch]), self.axis)
 
 
 def moved(

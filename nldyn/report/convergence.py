@@ -14,7 +14,7 @@ from nldyn.bifurcations.kinds import KINDS
 from nldyn.plot.diagram import PERIOD_COLOURS, file_axes, save_figure
 from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy
 from nldyn.reduction.model_errors import counted_modes
-from nldyn.report.convergence_page import study_content
+from nldyn.report.convergence_page import along_of, special, study_content
 from nldyn.report.convergence_tables import study_tables
 from nldyn.report.offline import write_html
 from nldyn.report.results import write_table
@@ -155,15 +155,17 @@ def draw_series(
 
 def plot_special_points(study: ConvergenceStudy, title: str = "") -> Axes:
     """Draw the folds and flips of the harmonic branch of every model, one line for each."""
-    followed = [model for model in study.models if model.special_hz]
+    followed = [model for model in study.models if model.special_values]
+    along = along_of(study)
     ax = file_axes(10.5, 1.5 + 0.22 * len(followed))
     for row, model in enumerate(followed):
         for kind, colour in (("LP", PERIOD_COLOURS[0]), ("PD", PERIOD_COLOURS[1])):
-            places = (model.special_hz or {})[kind]
+            places = special(model, along)[kind]
             ax.plot(places, [row] * len(places), KINDS[kind].marker, color=colour, markersize=3.5)
     ax.set_yticks(range(len(followed)), [f"{m.label}, {counted_modes(m)}" for m in followed])
     ax.tick_params(axis="y", labelsize=8)
-    ax.set_xlabel("frequency of folds (circles) and flips (squares) of the harmonic branch (Hz)")
+    marks = "of folds (circles) and flips (squares) of the harmonic branch"
+    ax.set_xlabel(f"{along.noun} {marks} ({along.unit or '1'})")
     ax.set_title(title)
     ax.grid(True, axis="y", linewidth=0.3)
     return ax

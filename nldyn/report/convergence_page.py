@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from nldyn.orbits.orbit import Orbit
-from nldyn.plot.words import axis_unit, unit_in
+from nldyn.plot.words import Along, axis_unit, unit_in
 from nldyn.reduction.convergence import QUANTITIES, ConvergenceStudy
 from nldyn.reduction.model_errors import (
     EIGENFREQUENCIES,
@@ -38,10 +38,13 @@ def study_content(
     title, text : str
         Title and text of the scene.
     """
-    low, high = study.setting.range_hz
+    along = along_of(study)
     return {
         "title": title or "Convergence study",
-        "subtitle": f"harmonic branch from {low:g} to {high:g} Hz; contacts at {study.at_hz:g} Hz",
+        "subtitle": f"harmonic branch over {along.range(*study.axis.limits)}; contacts at "
+        f"{along.told(study.at)}",
+        "along": along.label,
+        "unit": along.unit,
         "advice": [line.removeprefix("advice: ") for line in study.advice(TOLERANCE)],
         "reference": study.said_of_references().splitlines(),
         "notes": study.notes(),
@@ -49,11 +52,11 @@ def study_content(
         "bound": known(study.reference_error) or 0.0,
         "views": views(study),
         "models": [
-            {"name": f"{model.label}, {counted_modes(model)}", "special": model.special_hz or {}}
+            {"name": f"{model.label}, {counted_modes(model)}", "special": special(model, along)}
             for model in study.models
         ],
         "panels": panels(study),
-        "exact": study.best.special_hz or {},
+        "exact": special(study.best, along),
         "errors": {
             name: [positive(getattr(error, quantity)) for error in study.errors]
             for quantity, name in QUANTITIES.items()
@@ -62,6 +65,18 @@ def study_content(
         "versions": versions(),
         "scene": text,
     }
+
+
+def along_of(study: ConvergenceStudy) -> Along:
+    """How the values along the branches are told."""
+    system = None if study.best.orbit is None else study.best.orbit.system
+    return Along.of(study.axis.parameter, study.axis.limits[1], system)
+
+
+def special(model: Measured, along: Along) -> dict[str, list[float]]:
+    """Values at the folds and flips of a model, in the unit that is told."""
+    found = (model.special_values or {}).items()
+    return {kind: [value / along.factor for value in values] for kind, values in found}
 
 
 def views(study: ConvergenceStudy) -> list[dict[str, Any]]:
@@ -89,12 +104,17 @@ def panels(study: ConvergenceStudy) -> list[dict[str, Any]]:
     durations = [contact_time(m.orbit) for m in study.models if m.orbit]
     second, time = axis_unit(max(durations, default=0.0), TIMES)
 
+    along = along_of(study)
+
     def duration(orbit: Orbit) -> float:
         return contact_time(orbit) / second
 
+    def place(orbit: Orbit) -> float:
+        return study.axis.value(orbit) / along.factor
+
     asked: list[tuple[str, str, Callable[[Measured], Sequence[float]], Sequence[float]]] = [
         ("eigenfrequencies", "Hz", eigenfrequencies, eigenfrequencies(study.reference)),
-        ("peak frequency", "Hz", of_peak(lambda orbit: orbit.frequency_hz), ()),
+        ("peak position", along.unit or "1", of_peak(place), ()),
         ("peak height", length, of_peak(lambda orbit: orbit.max_abs_displacement / metre), ()),
         ("contact force", force, of_orbit(largest_force), of(largest_force, contact)),
         ("contact duration", time, of_orbit(duration), of(duration, contact)),

@@ -29,7 +29,7 @@ def convergence_study_of(
     refinements: Sequence[int] = (1,),
     meshes: Sequence[str] = (),
     components: Sequence[str] = (),
-    at_hz: float | None = None,
+    at: float | None = None,
     full: bool = False,
     progress: Progress | None = None,
     jobs: int = 1,
@@ -40,7 +40,7 @@ def convergence_study_of(
     ----------
     scene : Scene
         Its ``[reduction]`` is not used; nor are those of its components, if it has several.
-    modes, methods, at_hz, full, progress, jobs
+    modes, methods, at, full, progress, jobs
         As for `convergence_study`.
     refinements : sequence of int
         Meshes: every line is cut into so many.
@@ -89,7 +89,7 @@ def convergence_study_of(
             setting,
             modes=modes,
             methods=methods,
-            at_hz=at_hz,
+            at=at,
             full=full,
             progress=progress,
             jobs=jobs,

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from nldyn.base.errors import SystemModelError
 from nldyn.reduction.load_case import LoadCase
 from nldyn.scene.checks import check_computable
+from nldyn.scene.faults import told_as
+from nldyn.scene.followed import KEY, followed_parameter
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import Scene
 from nldyn.scene.stops_and_loads import acting_elements
@@ -35,15 +38,15 @@ def load_case_of(scene: Scene) -> LoadCase:
         raise scene_error(scene.file, ("damping", "modal_ratio"), fault)
     table = scene.continuation
     assert table is not None
-    if table.range_hz is None:
-        fault = "is followed at one frequency: modes are chosen and compared over a range_hz"
-        raise scene_error(scene.file, ("continuation", "parameter"), fault)
     acting: dict[str, Any] = {**acting_elements(scene)}
-    return LoadCase(
-        table.limits,
-        **acting,
-        modal_damping=scene.damping.modal_ratio,
-        observe=scene.observed,
-        rayleigh=scene.damping.rayleigh,
-        rotations=scene.rotations,
-    )
+    with told_as(scene, KEY if table.parameter else (), SystemModelError):
+        return LoadCase(
+            table.limits,
+            parameter=followed_parameter(scene) if table.parameter else None,
+            frequency_hz=table.frequency_hz,
+            **acting,
+            modal_damping=scene.damping.modal_ratio,
+            observe=scene.observed,
+            rayleigh=scene.damping.rayleigh,
+            rotations=scene.rotations,
+        )

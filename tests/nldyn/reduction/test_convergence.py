@@ -24,10 +24,12 @@ from nldyn import (
     SystemModelError,
     Unbalance,
     convergence_study,
+    select_modes,
     solve_orbit,
 )
 from nldyn.app.cli import main
 from nldyn.base.resources import example
+from nldyn.orbits.axis import Axis
 from nldyn.reduction import convergence, model_errors, studied
 from nldyn.reduction.convergence import QUANTITIES
 from nldyn.reduction.model_errors import (
@@ -43,7 +45,7 @@ from nldyn.reduction.model_errors import (
     receptance,
 )
 from nldyn.reduction.studied import Alone, Reference, receptance_bound
-from nldyn.report.convergence import write_study
+from nldyn.report.convergence import plot_special_points, write_study
 from nldyn.report.convergence_page import panels
 from nldyn.report.offline import unpacked
 from nldyn.scene.component import build_component
@@ -58,7 +60,7 @@ def study():
         SETTING,
         modes=(1, 3, 7, 15),
         methods=("rubin", "truncation"),
-        at_hz=36.0,
+        at=36.0,
         full=True,
     )
 
@@ -131,6 +133,73 @@ def test_kept_frequencies_are_exact(study):
     assert study.errors[index].eigenfrequency < 1e-9
 
 
+OVER_THE_GAP = replace(SETTING, limits=(0.0, 2e-3), parameter="gap", frequency_hz=23.0)
+
+
+@pytest.fixture(scope="module")
+def over_gap():
+    return convergence_study(string(), OVER_THE_GAP, modes=(1, 3, 7), at=3e-4, full=True)
+
+
+def test_over_the_gap_the_orbit_is_that_of_the_full_model_with_the_gap(over_gap):
+    setting = replace(SETTING, stops=(Stop("middle", stiffness=2e7, gap=3e-4),))
+    seven, full = (
+        largest_force(solve_orbit(setting.system(cms.reduce(string(), modes=count)), 23.0))
+        for count in (7, MASSES)
+    )
+    assert over_gap.reference.size == 21
+    assert largest_force(over_gap.reference.orbit) == pytest.approx(full, rel=1e-6)
+    assert over_gap.errors[2].force == pytest.approx(abs(seven / full - 1.0), rel=1e-4)
+
+
+def test_over_the_gap_folds_are_those_of_the_frequency_at_their_gap(over_gap):
+    folds = over_gap.best.special_values["LP"]
+    assert len(folds) == 2
+    reduced = cms.reduce(string(), modes=7)
+    for gap in folds:
+        stop = Stop("middle", stiffness=2e7, gap=gap)
+        branch = harmonic_branch(
+            replace(SETTING, stops=(stop,)).system(reduced),
+            replace(SETTING, stops=(stop,), limits=(15.0, 30.0)), lambda hz: None,
+        )  # fmt: skip
+        met = [s.frequency_hz for s in branch.special_points if s.kind == "LP"]
+        assert min(abs(hz / 23.0 - 1.0) for hz in met) < 1e-8
+    assert over_gap.errors[2].counts == (0, 0) and over_gap.errors[0].fold_flip > 0.0
+
+
+def test_over_the_gap_all_is_told_of_the_gap(over_gap, tmp_path):
+    assert "orbits at gap = 0.0003 m" in over_gap.report()
+    write_study(over_gap, tmp_path / "out")
+    with (tmp_path / "out" / "convergence.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert "peak_gap" in rows[0]
+    with (tmp_path / "out" / "special_points_by_model.csv").open() as file:
+        told = [float(row["gap"]) for row in csv.DictReader(file) if row["label"] == "rubin"]
+    assert told == [
+        value
+        for model in over_gap.models[:-1]
+        for values in model.special_values.values()
+        for value in values
+    ]
+    ax = plot_special_points(over_gap)
+    assert ax.get_xlabel().startswith("gap of folds") and ax.get_xlabel().endswith("(mm)")
+
+
+def test_modes_are_chosen_over_the_gap():
+    """The orbits of the chosen model are those of the full one, at gaps that it was not asked."""
+    stop = Stop.linear("middle", 1e5)
+    asked = replace(OVER_THE_GAP, stops=(stop,), limits=(1e-4, 4e-4))
+    chosen = select_modes(string(), asked, tolerance=0.05).reduced
+    assert chosen.modes < 7
+    for gap in (1.5e-4, 3e-4):
+        setting = replace(SETTING, stops=(replace(stop, gap=gap),))
+        own, full = (
+            solve_orbit(setting.system(model), 23.0)
+            for model in (chosen, cms.reduce(string(), modes=MASSES))
+        )
+        assert own.max_abs_displacement == pytest.approx(full.max_abs_displacement, rel=0.05)
+
+
 def test_contact_time_is_the_time_of_positive_penetration():
     orbit = solve_orbit(SETTING.system(cms.reduce(string(), modes=5)), 36.0)
     history = orbit.history(200000)
@@ -139,12 +208,12 @@ def test_contact_time_is_the_time_of_positive_penetration():
 
 
 def test_special_points_are_paired_nearest_first():
-    exact = {"LP": (10.0, 20.0), "PD": (30.0, 30.1)}
+    exact, axis = {"LP": (10.0, 20.0), "PD": (30.0, 30.1)}, Axis.in_frequency((5.0, 60.0))
     own = {"LP": (10.01,), "PD": (30.11, 30.02, 50.0)}
-    worst, missing, extra = matched(own, exact)
+    worst, missing, extra = matched(own, exact, axis)
     assert worst == pytest.approx(1e-3)
     assert (missing, extra) == (1, 1)
-    assert matched(exact, exact) == (0.0, 0, 0)
+    assert matched(exact, exact, axis) == (0.0, 0, 0)
 
 
 def test_the_report_says_from_where_on(study):
@@ -241,7 +310,7 @@ def test_a_model_is_no_proof_of_itself(small):
     """With two modes the contact force is wrong by more than 1 %, of which two cannot know."""
     assert small.errors[0].force > 0.01
     two, full = small.models[0], replace(small.models[-1], orbit=None)
-    errors = tuple(errors_of(model, full, two, False) for model in (two, two, full))
+    errors = tuple(errors_of(model, full, two, False, small.axis) for model in (two, two, full))
     alone = replace(small, models=(replace(two, modes=1), two, full), errors=errors, best=two)
     said = alone.report()
     assert "how wrong rubin with 2 modes is itself, only a study with more modes can say" in said
@@ -250,15 +319,15 @@ def test_a_model_is_no_proof_of_itself(small):
 
 
 def test_special_points_of_which_none_is_matched_have_no_error(small):
-    other = replace(small.models[0], special_hz={"LP": (1.0,), "PD": ()})
-    errors = errors_of(other, small.reference, small.best, True)
+    other = replace(small.models[0], special_values={"LP": (1.0,), "PD": ()})
+    errors = errors_of(other, small.reference, small.best, True, small.axis)
     assert np.isnan(errors.fold_flip)
-    assert errors.counts == (sum(map(len, small.best.special_hz.values())), 1)
+    assert errors.counts == (sum(map(len, small.best.special_values.values())), 1)
 
 
 def test_a_reference_without_a_bound_is_told_in_words(small):
     """The range has the second mode in it, which the reference leaves out."""
-    wide = replace(AT_TIP, range_hz=(30.0, 1000.0))
+    wide = replace(AT_TIP, limits=(30.0, 1000.0))
     whole = cms.reduce(cantilever(2), modes=1)
     linear = measured_linear("", "reference", whole, wide)
     known = Reference(whole, False, 0, {"": whole})
@@ -323,7 +392,7 @@ def test_dampers_close_a_receptance_of_modes_and_flexibility():
 
 def test_the_reference_of_models_of_one_size_is_the_one_with_the_best_receptance():
     for methods in (("craig-bampton", "rubin"), ("rubin", "craig-bampton")):
-        study = convergence_study(string(), SETTING, modes=(4,), methods=methods, at_hz=36.0)
+        study = convergence_study(string(), SETTING, modes=(4,), methods=methods, at=36.0)
         assert study.best.label == "rubin"
 
 
@@ -351,12 +420,12 @@ def folded():
     """At 10.2 Hz the motion from rest touches no stop; its branch folds, and goes back there."""
     interfaces = {"low": np.eye(2)[0], "high": np.eye(2)[1]}
     pair = cms.Matrices(PAIR, np.eye(2), interfaces)
-    return convergence_study(pair, UP_TO_A_FOLD, modes=(1, 2), at_hz=6.0)
+    return convergence_study(pair, UP_TO_A_FOLD, modes=(1, 2), at=6.0)
 
 
 def test_a_branch_that_folds_back_is_followed_from_the_other_end_too(folded):
     """The highest peak is that of the linear response near 4 Hz, which reaches no stop."""
-    (fold,) = folded.best.special_hz["LP"]
+    (fold,) = folded.best.special_values["LP"]
     assert fold > 9.0
     squares, shapes = np.linalg.eigh(PAIR)
     omega = 2 * np.pi * np.linspace(4.05, 4.06, 10001)[:, None]
@@ -372,19 +441,19 @@ def test_a_branch_that_folds_back_is_followed_from_the_other_end_too(folded):
 def with_spans(study, spans):
     """A study as if its models had such branches, without an orbit for contacts."""
     cut = [
-        replace(model, spans_hz=(span,), orbit=None)
+        replace(model, spans=(span,), orbit=None)
         for model, span in zip(study.models[:-1], spans, strict=True)
     ]
-    full, case = study.reference, (study.setting.range_hz, study.at_hz)
-    models = tuple(noted(model, cut[-1], None, case) for model in cut)
-    errors = [errors_of(model, full, models[-1], False) for model in (*models, full)]
+    full, axis = study.reference, study.axis
+    models = tuple(noted(model, cut[-1], None, axis, study.at) for model in cut)
+    errors = [errors_of(model, full, models[-1], False, axis) for model in (*models, full)]
     return replace(study, models=(*models, full), errors=tuple(errors), best=models[-1])
 
 
 def test_pieces_of_other_frequencies_are_not_compared_and_the_note_says_why(folded):
     cut = with_spans(folded, [(9.68, 10.2), (3.0, 10.2)])
     error = cut.errors[0]
-    assert np.isnan((error.peak_hz, error.peak_height, error.fold_flip)).all()
+    assert np.isnan((error.peak_at, error.peak_height, error.fold_flip)).all()
     assert error.counts is None
     assert cut.errors[1].counts == (0, 0)
     assert cut.models[0].note == (
@@ -457,7 +526,7 @@ def test_the_counts_that_are_not_given_fit_the_model():
     "changed, words",
     [
         ({"modes": ()}, "at least one component, count and method"),
-        ({"at_hz": 100.0}, "at_hz must lie in the range"),
+        ({"at": 100.0}, "at must lie in the range"),
     ],
 )
 def test_faults_are_told(changed, words):
@@ -482,7 +551,7 @@ def test_a_setting_without_excitation_is_refused():
         (["--modes", "999"], "999"),
         (["--meshes", "a.msh,b.msh"], "mesh.file names"),
         (["--meshes", "a.msh", "--refinements", "2"], "give either refinements or meshes"),
-        (["--at-hz", "500", "--modes", "1"], "at_hz must lie in the range"),
+        (["--at", "500", "--modes", "1"], "at must lie in the range"),
     ],
 )
 def test_faults_on_the_command_line(tmp_path, options, words):
@@ -541,7 +610,7 @@ def test_two_processes_give_the_same_study():
     studies = [convergence_study_of(scene, modes=(1, 2, 3), jobs=jobs) for jobs in (1, 2)]
     for one, other in zip(*(study.models for study in studies), strict=True):
         assert (one.label, one.modes, one.note) == (other.label, other.modes, other.note)
-        assert one.special_hz == other.special_hz
+        assert one.special_values == other.special_values
         assert (one.peak is None) == (other.peak is None)
         if one.peak is not None and other.peak is not None:
             assert np.array_equal(one.peak.point, other.peak.point)

@@ -73,8 +73,8 @@ def test_with_all_modes_the_branch_is_that_of_the_whole_chain(study):
     force = largest_force(alone.orbit)
     assert force > 0.0
     assert largest_force(study.best.orbit) == pytest.approx(force, rel=1e-6)
-    for kind, places in alone.special_hz.items():
-        assert study.best.special_hz[kind] == pytest.approx(places, rel=1e-6)
+    for kind, places in alone.special_values.items():
+        assert study.best.special_values[kind] == pytest.approx(places, rel=1e-6)
 
 
 @pytest.mark.parametrize("method, residual", [("rubin", 1), ("truncation", 0)])
@@ -113,7 +113,7 @@ def test_a_component_with_fewer_modes_keeps_all(study):
 def test_what_is_kept_as_it_is_is_the_same_in_the_reference(tmp_path):
     """Two modes of a, so that the whole has those of the chain whose left part has two."""
     two = cms.reduce(A, modes=2)
-    setting = replace(SETTING, range_hz=(35.5, 36.0))
+    setting = replace(SETTING, limits=(35.5, 36.0))
     study = convergence_study(JoinedComponents({"b": B}, JOINTS, {"a": two}), setting, modes=(2, 8))
     whole = cms.couple({"a": two, "b": cms.reduce(B, modes=8)}, JOINTS)
     assert study.reference.frequencies_hz == pytest.approx(whole.frequencies_hz, rel=1e-9)

@@ -15,6 +15,7 @@ import fem
 from nldyn import LoadCase, Stop, SystemModelError, Unbalance, select_modes, solve_orbit
 from nldyn.base.resources import example
 from nldyn.branches.peaks import resonance_peaks
+from nldyn.orbits.axis import Axis
 from nldyn.reduction.candidates import contact_duration
 from nldyn.reduction.model_errors import harmonic_branch, largest_force, matched, special_points_of
 from nldyn.scene.component import build_component
@@ -83,7 +84,7 @@ def test_true_error_of_folds_and_flips_lies_within_the_stated_band(stiffness, ra
     """Of a string that meets a spring, against all of its 41 modes."""
     setting = replace(
         SETTING,
-        range_hz=range_hz,
+        limits=range_hz,
         stops=(Stop.linear("middle", stiffness),),
         modal_damping=0.01,
     )
@@ -94,7 +95,7 @@ def test_true_error_of_folds_and_flips_lies_within_the_stated_band(stiffness, ra
         for m in models
     )
     assert len(exact["PD"]) >= 2
-    error, missing, extra = matched(own, exact)
+    error, missing, extra = matched(own, exact, Axis.in_frequency(range_hz))
     low, high = found.special_error
     assert 0.95 * low <= error <= 1.05 * high < 0.01
     assert abs(missing - found.missing) + abs(extra - found.extra) <= found.doubtful

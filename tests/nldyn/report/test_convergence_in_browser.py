@@ -35,7 +35,7 @@ return [...document.querySelectorAll("#table tbody tr")].map((row) =>
 @pytest.fixture(scope="module")
 def study():
     other = replace(string(), stiffness=1.02 * string().stiffness)
-    return convergence_study({"a": string(), "b": other}, SETTING, modes=(1, 3), at_hz=36.0)
+    return convergence_study({"a": string(), "b": other}, SETTING, modes=(1, 3), at=36.0)
 
 
 @pytest.fixture(scope="module")

@@ -183,7 +183,9 @@ def test_a_stop_whose_gap_changes_is_not_drawn_at_one_gap():
     assert stops_to_draw(parse_scene(changed)) == []
 
 
-def test_modes_are_not_chosen_over_a_parameter():
+def test_modes_are_chosen_over_the_parameter_of_the_continuation():
     text = TEXT.replace("[damping]", "[reduction]\ntolerance = 0.01\n[damping]", 1)
-    with pytest.raises(SceneError, match="modes are chosen and compared over a range_hz"):
-        load_case_of(parse_scene(text))
+    scene = parse_scene(text)
+    setting = load_case_of(scene)
+    assert (setting.parameter, setting.limits) == (Parameter("gap"), scene.continuation.limits)
+    assert setting.frequency_hz == scene.continuation.frequency_hz
