@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import textwrap
+from importlib.util import find_spec
 
 EGL_VARIABLE = "VTK_DEFAULT_OPENGL_WINDOW"
 EGL_WINDOW = "vtkEGLRenderWindow"
@@ -26,6 +27,10 @@ PROBE = textwrap.dedent(
     """
 )
 PROBE_SECONDS = 180.0
+
+
+MISSING = 'what is drawn of a mesh needs {}, which is not installed: pip install "nldyn[render]"'
+LIBRARIES = ("pyvista", "imageio")
 
 
 class RenderError(RuntimeError):
@@ -54,12 +59,20 @@ def gl_available() -> tuple[bool, str]:
     >>> available or "libegl1" in advice
     True
     """
+    if missing := missing_library():
+        return False, missing
     window = working_window()
     if window is None:
         return False, ADVICE
     if window:
         os.environ[EGL_VARIABLE] = window
     return True, ""
+
+
+def missing_library() -> str:
+    """One sentence on what is not installed of what draws meshes; empty if nothing is missing."""
+    missing = [name for name in LIBRARIES if find_spec(name) is None]
+    return MISSING.format(" and ".join(missing)) if missing else ""
 
 
 @functools.cache
@@ -113,3 +126,9 @@ def require_gl() -> None:
     available, advice = gl_available()
     if not available:
         raise RenderError(advice)
+
+
+def require_library() -> None:
+    """Raise RenderError if what draws meshes is not installed."""
+    if missing := missing_library():
+        raise RenderError(missing)

@@ -27,7 +27,7 @@ from fem.base.files import draft_of
 from fem.render.colouring import colour_name, surface_values
 from fem.render.frame_scenery import Block, StopSphere, mass_blocks, support_solids
 from fem.render.frame_surface import FrameSurface, frame_surface
-from fem.render.gl import RenderError, on_screen, require_gl
+from fem.render.gl import RenderError, on_screen, require_gl, require_library
 from fem.render.several import OfPart, Several, SeveralSurfaces, Surface, stops_at
 from fem.render.stop_scenery import StopBody, largest_scale, stop_bodies
 from fem.render.structure_scenery import Cube, mass_cubes, support_marks
@@ -688,7 +688,14 @@ def polydata(drawing: Surface, points: FloatArray) -> tuple[Any, Any]:
 
 
 def surface_of(component: AnyComponent, mirror: str | None = None) -> Surface:
-    """The surface of a frame, a structure or several; only one frame can be mirrored."""
+    """The surface of a frame, a structure or several; only one frame can be mirrored.
+
+    Raises
+    ------
+    RenderError
+        If what draws it is not installed.
+    """
+    require_library()
     if isinstance(component, Several):
         if mirror is not None:
             raise ModelError(f"{component.source}: several components are drawn without a mirror")

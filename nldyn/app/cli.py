@@ -141,6 +141,7 @@ def run(work: Work, log: bool, as_json: bool, jobs: int) -> Told:
     The report is one page for a browser, report.html. What DIR holds of the same scene, finished,
     is not computed again.
     """
+    from fem.render.gl import missing_library
     from nldyn.io.checkpoint import CheckpointFile
     from nldyn.report.again import computed_before, drawn_of, read_summary
     from nldyn.report.results import write_results
@@ -155,10 +156,13 @@ def run(work: Work, log: bool, as_json: bool, jobs: int) -> Told:
     before = None if work.replace else computed_before(out, scene, structure)
     given = scene, parts.part("branches"), CheckpointFile(work.unfinished), jobs, structure
     found = before or work.found(lambda: results_of(*given))
+    missing = ""
     if before is None or log:
         work.line("report", 0.0, 1.0)
         yscale: Literal["linear", "log"] = "log" if log else "linear"
-        write_results(found, out, scene, drawn=drawn_of(scene, structure), yscale=yscale)
+        drawn = drawn_of(scene, structure)
+        missing = missing_library() if drawn else ""
+        write_results(found, out, scene, drawn=None if missing else drawn, yscale=yscale)
     seconds = time.perf_counter() - work.start
     coverage = found.coverage_lines() if isinstance(found, Exploration) else []
     diagram = found.diagram if isinstance(found, Exploration) else found
@@ -178,8 +182,9 @@ def run(work: Work, log: bool, as_json: bool, jobs: int) -> Told:
         lines = [*told.get("answer", []), *coverage, describe(diagram, seconds, out)]
         if before is not None:
             lines.append("all of it was computed before; '--replace' computes it anew")
-    fault = "" if diagram.branches else "no periodic orbit was found; the tables are empty"
-    return Told(lines, fault, NOTHING_FOUND)
+    if not diagram.branches:
+        return Told(lines, "no periodic orbit was found; the tables are empty", NOTHING_FOUND)
+    return Told(lines, missing, NO_GRAPHICS)
 
 
 @main.command()
@@ -370,7 +375,6 @@ def modes(
         raise click.UsageError("'--animate' needs '--out'")
     with plain_errors():
         from nldyn.report.modes import check_modes, mode_table
-        from nldyn.report.render import render_modes_of
         from nldyn.runtime.progress import messages_shown
         from nldyn.scene.build import build_structure
         from nldyn.scene.read import load_scene
@@ -390,6 +394,8 @@ def modes(
         check_modes(loaded, modes or (), len(table.frequencies_hz))
         missing = ""
         if out is not None:
+            from nldyn.report.render import render_modes_of
+
             missing = render_modes_of(
                 loaded, structure, out, modes=modes or (), view=view, against=compared,
                 animated=animated,

@@ -5,6 +5,8 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 
+from nldyn.base.extras import how_to_install
+
 
 def homes(package: str, path: Sequence[str]) -> dict[str, str]:
     """Modules of the names in a package's stub; a sub-package that it lists is its own home."""
@@ -29,7 +31,11 @@ def face(
     def load(name: str) -> object:
         if name not in known:
             raise AttributeError(f"module '{package}' has no attribute '{name}'")
-        module = import_module(known[name])
+        try:
+            module = import_module(known[name])
+        except ModuleNotFoundError as error:
+            told = how_to_install(error.name or "", f"{package}.{name}")
+            raise ModuleNotFoundError(told or str(error), name=error.name) from error
         return module if known[name] == f"{package}.{name}" else getattr(module, name)
 
     names = sorted(name for name, home in known.items() if home != f"{package}.{name}")

@@ -6,8 +6,7 @@ from importlib import import_module
 from typing import Any
 
 from nldyn.base.errors import SystemModelError
-
-EXTRAS = {"pandas": "tables", "xarray": "tables", "pyuff": "uff"}
+from nldyn.base.extras import how_to_install
 
 
 def optional(package: str, asked: str) -> Any:
@@ -16,7 +15,7 @@ def optional(package: str, asked: str) -> Any:
     Parameters
     ----------
     package : str
-        One of `EXTRAS`.
+        One of `extras.EXTRAS`.
     asked : str
         What needs it.
 
@@ -28,7 +27,4 @@ def optional(package: str, asked: str) -> Any:
     try:
         return import_module(package)
     except ImportError:
-        raise SystemModelError(
-            f"{asked} needs {package}, which is not installed: "
-            f'pip install "nldyn[{EXTRAS[package]}]"'
-        ) from None
+        raise SystemModelError(how_to_install(package, asked)) from None

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 import cms
+from fem.render.gl import missing_library
 from fem.render.several import Several
 from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.branches.branch import Branch
@@ -179,6 +180,8 @@ def drawn_again(scene: Scene | None, diagram: Diagram) -> tuple[Drawn | None, li
         return None, []
     try:
         drawn = drawn_of(scene, build_structure(scene))
+        if drawn and (missing := missing_library()):
+            return None, [f"The structure is not shown: {missing}"]
     except SceneError as error:
         return None, [
             f"The structure is not shown: {error}; "

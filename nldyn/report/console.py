@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from nldyn.base.exit_codes import BAD_INPUT, INTERRUPTED, NOTHING_FOUND
+from nldyn.base.exit_codes import BAD_INPUT, INTERRUPTED, NO_GRAPHICS, NOTHING_FOUND
+from nldyn.base.extras import how_to_install
 from nldyn.runtime.interruption import interrupted
 
 
@@ -26,6 +27,12 @@ def plain_errors() -> Iterator[None]:
     except ConvergenceError as error:
         print(f"nldyn: {printable(str(error))}", file=sys.stderr)
         sys.exit(NOTHING_FOUND)
+    except ModuleNotFoundError as error:
+        told = how_to_install(error.name or "", "what this command draws")
+        if not told:
+            raise
+        print(f"nldyn: {told}", file=sys.stderr)
+        sys.exit(NO_GRAPHICS)
     except MemoryError:
         print("nldyn: the memory does not suffice for this", file=sys.stderr)
         sys.exit(BAD_INPUT)

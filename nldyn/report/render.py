@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.render.gl import missing_library
 from nldyn.base.errors import SceneError
 from nldyn.plot.diagram import orbit_title
 from nldyn.report.again import drawn_of
@@ -148,6 +149,8 @@ def render_scene(
         tell = shares.part("pictures")
         drawing = Drawing.of(scene, structure, folder, modes, view, tell)
         assert drawing is not None  # there is a mesh
+        if missing := missing_library():
+            return Rendering(Path(directory), orbit, missing)
         drawing.pages(orbit)
         pictures = drawing.deepest_contact, partial(drawing.motion, video=video)
         missing = drawing.draw(*(partial(each, orbit) for each in pictures if orbit is not None))
@@ -269,8 +272,8 @@ def render_modes_of(
             write_table(folder / "mac.csv", against.columns(), against.rows())
             save_mac(against, folder)
         drawing = Drawing.of(scene, structure, folder, modes, view)
-        if drawing is None:
-            return ""
+        if drawing is None or (missing := missing_library()):
+            return "" if drawing is None else missing
         drawing.mode_page()
         pictures = [] if against is None else [partial(drawing.draw_comparison, against)]
         return drawing.draw(*pictures, *([drawing.draw_moving_modes] if animated else []))
