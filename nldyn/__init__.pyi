@@ -91,6 +91,7 @@ from nldyn.system.loads import Unbalance as Unbalance
 from nldyn.system.measured import measured_force as measured_force
 from nldyn.system.parameters import Parameter as Parameter
 from nldyn.system.rigid_stop import RigidStop as RigidStop
+from nldyn.system.round_stop import RoundStop as RoundStop
 from nldyn.system.spin import Spin as Spin
 from nldyn.system.springs_dampers import Damper as Damper
 from nldyn.system.springs_dampers import PolynomialSpring as PolynomialSpring

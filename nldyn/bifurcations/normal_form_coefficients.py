@@ -257,8 +257,8 @@ def loop_of(place: Place) -> Loop:
         except ConvergenceError as error:
             raise CoefficientError(str(error)) from None
         flow = at.problem.flow
-        gaps = np.array([stop.gap for stop in flow.system.stops])
-        closed = at.nodes @ flow.rows[: gaps.size].T > gaps
+        stops = enumerate(flow.system.stops)
+        closed = np.array([flow.outputs_at(i, at.nodes) > stop.gap for i, stop in stops])
         return jacobians, pace, (at.segments.closings.tobytes(), closed.tobytes())
 
     return Loop(nodes, float(place.point[-1]), evaluate, family.scale(place.point))

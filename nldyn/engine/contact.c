@@ -123,7 +123,7 @@ static int reach_aim(Motion *M, Trial *trial, bool event, bool fine)
     double dh = time_to_event(fl, aim, M->closed, w, end_phase);
     double off = watched_pace(fl, aim, M->closed, w, end_phase).value;
     int out = watched(fl, aim, M->closed, w, end_phase);
-    bool there = fabs(off) <= output_noise(fl, out, M->w);
+    bool there = fabs(off) <= gap_noise(fl, out, M->w);
     if (is_slider(fl, aim)) {
         dh = time_to_slip(M, aim, trial->kind, end_phase, h, &off);
         there = fabs(dh) <= RELEASED * h ||
@@ -260,8 +260,12 @@ static double lost_to_rounding(const Flow *fl, int s, const double *w, double pe
     const Stop *stop = stop_of(fl, s);
     double p = stop->exponent, rate = stop->stiffness * stop->mobility;
     double impact_speed = sqrt(2.0 * rate * pow(peak, p + 1.0) / (p + 1.0));
-    double speed = impact_speed + output_size(fl, s, w, 0) * fl->omega;
-    const double *row = row_of(fl, 1, s);
-    for (int j = 0; j < fl->size; j++) speed += fabs(row[j] * w[j]);
+    double speed = impact_speed;
+    int rows[2] = {s, (int)stop->second};
+    for (int d = 0; d < (is_round(fl, s) ? 2 : 1); d++) {
+        const double *row = row_of(fl, 1, rows[d]);
+        speed += output_size(fl, rows[d], w, 0) * fl->omega;
+        for (int j = 0; j < fl->size; j++) speed += fabs(row[j] * w[j]);
+    }
     return noise / peak * impact_speed / speed;
 }

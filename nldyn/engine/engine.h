@@ -21,7 +21,7 @@
 /* outcomes; the names and numbers of layout.py */
 enum Status {
     OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL, ROUNDED,
-    TOO_MANY_STEPS, OTHER_CONTACTS, INTERRUPTED, OUT_OF_MEMORY
+    TOO_MANY_STEPS, OTHER_CONTACTS, INTERRUPTED, OUT_OF_MEMORY, SLIDING_TURNS
 };
 
 #define FLIGHT (-1) /* kind of a piece that is no contact panel */
@@ -85,15 +85,22 @@ typedef struct {
     double belt;        /* speed of what it slides on */
     double normal;      /* stop whose force presses it on, or -1 */
     double pressing;    /* force that does so in place of a stop's */
+    double second;      /* of a round clearance: row of its second direction, or -1 */
+    double lead;        /* of that: row of the first one, or -1 */
+    double centre;      /* of both: displacement along them of the centre */
+    double sense;       /* 1 for a ring, in which the body is, -1 for a pin, around which it is */
+    double rub;         /* coefficient of friction in the sense of sliding, from first to second */
+    double surface;     /* speed in that sense of the surface on that of the other side */
 } Stop;
 
 enum Column {
     GAP, STIFFNESS, EXPONENT, DISSIPATION, DASHPOT, MOBILITY, DURATION, INSTANT, RESTITUTION, BOND,
-    DRAG, CUBIC, RELEASE, FRICTION, ADHESION, FADING, BELT, NORMAL, PRESSING, FIRST_POWER
+    DRAG, CUBIC, RELEASE, FRICTION, ADHESION, FADING, BELT, NORMAL, PRESSING,
+    SECOND, LEAD, CENTRE, SENSE, RUB, SURFACE, FIRST_POWER
 };
 
-/* A system. Outputs are the penetrations of the stops and the displacements of sliders and bonds,
- * then the observed displacements. */
+/* A system. Outputs are the penetrations of the stops, the displacements of sliders and bonds and
+ * those along the second directions of round clearances, then the observed displacements. */
 typedef struct {
     int64_t n, n_out, n_stops, n_columns, n_orders;
     const double *blocks; /* (n, 2, 2) */
@@ -102,7 +109,7 @@ typedef struct {
     const double *force;  /* (2n, n_stops): w' = A w - force F */
     const double *orders; /* (h,) multiples of the excitation frequency; 1 first */
     const Complex *drive; /* (h, 3, 2n) excitation Σ Re(Σ_p ω^p drive[h, p] e^{i orders[h] ωt}) */
-    const double *stops;  /* (n_stops, n_columns): stops, sliders, bonds */
+    const double *stops;  /* (n_stops, n_columns): stops, sliders, bonds, seconds */
     const int64_t *laws;  /* (n_stops,) address of a law (of a rigid stop's restitution), or 0 */
     double tail;          /* largest relative Legendre tail accepted on a contact panel */
     double node_angle;    /* phase of the fastest mode from node to node, in rad */
@@ -178,7 +185,10 @@ typedef struct {
     int *active;      /* (na,) closed stops */
     double *output;   /* (outputs, m) values at the nodes */
     double *F;        /* (na, m) forces */
-    double *slope;    /* (outputs, m) derivative of the force with respect to the output */
+    double *slope;    /* (outputs, m) derivative of the force with respect to the output; then, with
+                       * round clearances, (outputs, m) that by the output of the other direction */
+    bool round;       /* whether there are any */
+    double *radial;   /* (na, m) their penetrations, at the place of the first direction */
     double *there;    /* (n, 4, m) exp(A t_i) */
     double *to;       /* (outputs, 2n, m) row exp(A t_i) */
     double *back;     /* (na, 2n, m) exp(-A t_j) force */

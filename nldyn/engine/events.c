@@ -10,7 +10,7 @@ static int watched(const Flow *fl, int s, const bool *closed, const double *w, d
     if (!never_pulls(fl, s)) return s;
     const Stop *stop = stop_of(fl, s);
     if (closed[s]) return (int)stop->release;
-    double depth = output_now(fl, s, w, phase).value - stop->gap;
+    double depth = gap_now(fl, s, w, phase).value;
     return depth > 10.0 * output_noise(fl, s, w) ? (int)stop->release : s;
 }
 
@@ -20,19 +20,17 @@ static Course watched_pace(const Flow *fl, int stop, const bool *closed, const d
                            double phase)
 {
     int out = watched(fl, stop, closed, w, phase);
+    if (out == stop) return gap_now(fl, stop, w, phase);
     Course at = output_now(fl, out, w, phase);
-    if (out != stop) {
-        const double *row = row_of(fl, 0, out);
-        for (int s = 0; s < fl->n_stops; s++) {
-            if (!closed[s]) continue;
-            Course depth = output_now(fl, s, w, phase);
-            double force = law(fl, s, depth.value - stop_of(fl, s)->gap, depth.first).force;
-            const double *push = push_of(fl, s);
-            for (int k = 0; k < fl->size; k++) at.first -= row[k] * push[k] * force;
-        }
-        at.second = 0.0;
+    const double *row = row_of(fl, 0, out);
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!closed[s]) continue;
+        double force = force_now(fl, s, w, phase);
+        const double *push = push_of(fl, s);
+        for (int k = 0; k < fl->size; k++) at.first -= row[k] * push[k] * force;
     }
     at.value -= stop_of(fl, stop)->gap;
+    at.second = 0.0;
     return at;
 }
 
@@ -123,7 +121,7 @@ static bool at_switch(const Flow *fl, int stop, const double *w, double phase, d
         return fabs(slip(fl, stop, w, phase)) <=
                allowed * fabs(at.second) + 10.0 * rate_noise(fl, stop, w);
     double instant = allowed + 10.0 * SUM_ROUNDING * phase / fl->omega;
-    return fabs(at.value) <= instant * fabs(at.first) + 10.0 * output_noise(fl, out, w);
+    return fabs(at.value) <= instant * fabs(at.first) + 10.0 * gap_noise(fl, out, w);
 }
 
 /* whether a stop is to open or close now, to within a time allowed or rounding; a rigid one does
@@ -164,11 +162,12 @@ static int stop_at_switch(const Flow *fl, const double *w, double phase, double 
     double nearest = INFINITY;
     double allowed = 10.0 * (coarsest_instant(fl) * h + SUM_ROUNDING * phase / fl->omega);
     for (int s = 0; s < fl->n_stops; s++) {
-        if (is_bond(fl, s) || is_slider(fl, s) || (is_rigid(fl, s) && closed[s])) continue;
+        if (is_bond(fl, s) || is_slider(fl, s) || is_second(fl, s)) continue;
+        if (is_rigid(fl, s) && closed[s]) continue;
         double late = fabs(time_to_event(fl, s, closed, w, phase));
         double gap = watched_pace(fl, s, closed, w, phase).value;
         int out = watched(fl, s, closed, w, phase);
-        bool here = late <= allowed || fabs(gap) <= 10.0 * output_noise(fl, out, w);
+        bool here = late <= allowed || fabs(gap) <= 10.0 * gap_noise(fl, out, w);
         if (late < nearest && here) {
             stop = s;
             nearest = late;
@@ -191,9 +190,9 @@ static double graded_length(const Flow *fl, const Panel *panel, const double *w,
     for (int a = 0; a < panel->na; a++) {
         int s = panel->active[a];
         if (s == event || !singular_slope(fl, s)) continue;
-        Course at = output_now(fl, s, w, phase);
-        double delta = at.value - stop_of(fl, s)->gap, speed = at.first, accel = at.second, away;
-        if (delta <= 10.0 * output_noise(fl, s, w)) continue;
+        Course at = depth_now(fl, s, w, phase);
+        double delta = at.value, speed = at.first, accel = at.second, away;
+        if (delta <= 10.0 * gap_noise(fl, s, w)) continue;
         if (accel > 0.0 && speed * speed < 2.0 * accel * delta)
             away = sqrt(2.0 * delta / accel); /* it nearly opens: a complex pair */
         else if (sign * speed > 0.0)
@@ -231,6 +230,30 @@ static void show_closed(const Flow *fl, const Panel *panel, int position, int s,
         inner[i] += creep_time * panel->output[(panel->na + position) * m + i];
 }
 
+/* the same of a round clearance, open or closed: what passes zero where it switches */
+static void show_round(const Motion *M, int kind, double phase, double h, int stop, int position,
+                       double *inner)
+{
+    const Flow *fl = M->fl;
+    const Panel *panel = M->panel;
+    int m = panel->m, second = (int)stop_of(fl, stop)->second;
+    double *values[2] = {M->s->waves, M->s->waves + m};
+    if (M->closed[stop]) {
+        memcpy(values[0], panel->output + (size_t)position * m, sizeof(double) * m);
+        memcpy(values[1], panel->output + (size_t)place_of(panel, second) * m, sizeof(double) * m);
+    } else {
+        for (int d = 0; d < 2; d++) {
+            int row = d == 0 ? stop : second;
+            node_outputs(fl, M->tab, kind, phase, h, panel, row, values[d], M->s);
+            for (int i = 0; i < m; i++) values[d][i] -= stop_of(fl, row)->centre;
+        }
+    }
+    for (int i = 0; i < m; i++) {
+        double place[2] = {values[0][i], values[1][i]}, still[2] = {0.0, 0.0};
+        inner[i] = around(fl, stop, place, still, still).value;
+    }
+}
+
 /* fill s->values (m + 2,) of a stop; `position` is its place among the closed ones */
 static Shown show_stop(const Motion *M, int kind, double phase, double h, int stop, int out,
                        int position)
@@ -240,11 +263,17 @@ static Shown show_stop(const Motion *M, int kind, double phase, double h, int st
     Scratch *s = M->s;
     const Panel *panel = M->panel;
     int m = panel->m;
-    double gap = stop_of(fl, stop)->gap, sign = M->closed[stop] ? 1.0 : -1.0;
-    Course first = output_now(fl, out, M->w, phase);
-    double start = first.value, end = output_now(fl, out, M->w_end, phase + fl->omega * h).value;
-    Shown shown = {output_noise(fl, out, M->w), 0.0, sign * first.first};
-    if (M->closed[stop]) {
+    bool round = is_round(fl, stop);
+    double gap = round ? 0.0 : stop_of(fl, stop)->gap, sign = M->closed[stop] ? 1.0 : -1.0;
+    double end_phase = phase + fl->omega * h;
+    Course first = round ? gap_now(fl, stop, M->w, phase) : output_now(fl, out, M->w, phase);
+    double start = first.value, end = round ? gap_now(fl, stop, M->w_end, end_phase).value
+                                            : output_now(fl, out, M->w_end, end_phase).value;
+    Shown shown = {gap_noise(fl, out, M->w), 0.0, sign * first.first};
+    if (round) {
+        show_round(M, kind, phase, h, stop, position, s->inner);
+        for (int i = 0; i < m; i++) s->inner[i] *= sign;
+    } else if (M->closed[stop]) {
         show_closed(fl, panel, position, stop, out, s->inner);
         if (is_rigid(fl, stop)) {
             const double *output = panel->output + (size_t)position * m;
@@ -348,7 +377,8 @@ static Event first_event(const Motion *M, int kind, double phase, double h)
     if (M->panel->na < fl->n_stops) drive_back(fl, M->tab, kind, M->w, h, M->panel, M->s);
     for (int stop = 0; stop < fl->n_stops; stop++) {
         if (M->closed[stop]) position++; /* a bond is always closed */
-        if (is_bond(fl, stop) || (is_slider(fl, stop) && !M->closed[stop])) continue;
+        if (is_bond(fl, stop) || is_second(fl, stop)) continue;
+        if (is_slider(fl, stop) && !M->closed[stop]) continue;
         if (is_rigid(fl, stop) && !M->closed[stop] && held_open(M, stop)) continue;
         if (!is_slider(fl, stop)) {
             int out = watched(fl, stop, M->closed, M->w, phase);

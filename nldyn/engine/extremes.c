@@ -7,16 +7,21 @@
 #define MOST_SAMPLES 3000000 /* of a piece, in which no more extremes are told */
 #define KEPT_WEIGHTS 1024 /* samples of a panel whose weights are kept for the next panel */
 
-/* a search for extremes; the output is row . w + Re Σ forced e(t), of all terms of the response and
- * of a base on which it rides */
+/* row . w + Re Σ forced e(t), of all terms of the response and of a base on which it rides */
+typedef struct {
+    const double *row, *row1; /* (2n,) of the displacement and its rate */
+    Complex *forced;          /* (1 + n_terms,) */
+} Moving;
+
+/* a search for extremes of an output */
 typedef struct {
     Flow fl;
     Piece piece;
     Watch watch;
-    const double *row, *row1; /* (2n,) of the output and its rate */
+    Moving moving[2]; /* the output; of a round clearance both directions */
+    const Stop *round; /* of one, or none */
     int n_terms;
     Term *terms;
-    Complex *forced; /* (1 + n_terms,) */
     double *w, *v, *weights, *fresh;
     Square *steps; /* (n,) exponentials over a sample of a flight */
     int64_t n_samples, kept; /* of the piece at hand; with which `weights` were made */
@@ -27,23 +32,36 @@ typedef struct {
     int64_t capacity, count;
 } Search;
 
-/* value and rate (slope) of the output, with the homogeneous state w, a time t after the start of
- * the piece */
-static Value output_rate(const Search *S, double t, const double *w)
+/* value and rate (slope) of a displacement, with the homogeneous state w, a time t after the start
+ * of the piece */
+static Value moving_rate(const Search *S, const Moving *moving, double t, const double *w)
 {
     double omega = S->fl.omega, phase = S->piece.phase + omega * t;
-    Complex turn = product(S->forced[0], turned(phase));
+    Complex turn = product(moving->forced[0], turned(phase));
     Value found = {turn.re, -omega * turn.im};
     for (int k = 0; k < S->n_terms; k++) {
         TermCourse e = term_since(S->terms + k, omega, phase, t);
-        found.value += product(S->forced[1 + k], e.value).re;
-        found.slope += product(S->forced[1 + k], e.first).re;
+        found.value += product(moving->forced[1 + k], e.value).re;
+        found.slope += product(moving->forced[1 + k], e.first).re;
     }
     for (int k = 0; k < S->fl.size; k++) {
-        found.value += S->row[k] * w[k];
-        found.slope += S->row1[k] * w[k];
+        found.value += moving->row[k] * w[k];
+        found.slope += moving->row1[k] * w[k];
     }
     return found;
+}
+
+/* the same of the output; of a round clearance the distance from its centre, positive within a ring,
+ * and what changes its sign with its rate, smooth at the centre */
+static Value output_rate(const Search *S, double t, const double *w)
+{
+    Value first = moving_rate(S, S->moving, t, w);
+    if (!S->round) return first;
+    Value second = moving_rate(S, S->moving + 1, t, w);
+    double x = first.value - S->round->centre;
+    double y = second.value - stop_of(&S->fl, (int)S->round->second)->centre;
+    double share = S->round->sense / S->round->gap;
+    return (Value){S->round->sense * hypot(x, y), share * (x * first.slope + y * second.slope)};
 }
 
 /* the same with the state solved for */
@@ -152,12 +170,16 @@ static double leave_unseen(Search *S)
 {
     const Flow *fl = &S->fl;
     double least = 0.0, fastest = 0.0, *w = S->piece.start, *sizes = S->v;
-    for (int p = 0; p <= S->n_terms; p++) least += modulus(S->forced[p]);
-    for (int b = 0; b < fl->n; b++) {
-        int j = 2 * b;
-        sizes[b] = hypot(S->row[j], S->row[j + 1]) * hypot(w[j], w[j + 1]);
-        least += sizes[b];
+    for (int b = 0; b < fl->n; b++) sizes[b] = 0.0;
+    for (int d = 0; d < (S->round ? 2 : 1); d++) {
+        const Moving *moving = S->moving + d;
+        for (int p = 0; p <= S->n_terms; p++) least += modulus(moving->forced[p]);
+        for (int b = 0; b < fl->n; b++) {
+            int j = 2 * b;
+            sizes[b] += hypot(moving->row[j], moving->row[j + 1]) * hypot(w[j], w[j + 1]);
+        }
     }
+    for (int b = 0; b < fl->n; b++) least += sizes[b];
     least *= UNSEEN;
     for (int b = 0; b < fl->n; b++) {
         if (sizes[b] <= least) {
@@ -257,7 +279,8 @@ static void lay_out_search(Block *block, const System *sys, const Gauss *tab, si
     lay_out_flow(block, sys, 0, NULL, &S->fl);
     lay_out_piece(block, &S->fl, tab, &S->piece);
     S->terms = room(block, most_terms(sys) + more, sizeof(Term));
-    S->forced = room(block, 1 + most_terms(sys) + more, sizeof(Complex));
+    for (int d = 0; d < 2; d++)
+        S->moving[d].forced = room(block, 1 + most_terms(sys) + more, sizeof(Complex));
     S->w = numbers(block, S->fl.size);
     S->v = numbers(block, S->fl.size);
     S->weights = numbers(block, (size_t)(KEPT_WEIGHTS + 1) * tab->m);
@@ -270,15 +293,17 @@ static void begin_output(Search *S, int out, int64_t more, const double *orders,
                          const Complex *amplitudes)
 {
     const Flow *fl = &S->fl;
-    S->row = row_of(fl, 0, out);
-    S->row1 = row_of(fl, 1, out);
+    S->round = out < fl->n_stops && is_round(fl, out) ? stop_of(fl, out) : NULL;
+    int rows[2] = {out, S->round ? (int)S->round->second : out};
     S->n_terms = fl->n_terms + (int)more;
-    for (int p = 0; p <= fl->n_terms; p++) {
-        S->forced[p] = forced_of(fl, p, 0, out);
-        if (p > 0) S->terms[p - 1] = fl->terms[p - 1];
+    for (int p = 0; p < fl->n_terms; p++) S->terms[p] = fl->terms[p];
+    for (int d = 0; d < 2; d++) {
+        S->moving[d].row = row_of(fl, 0, rows[d]);
+        S->moving[d].row1 = row_of(fl, 1, rows[d]);
+        for (int p = 0; p <= fl->n_terms; p++) S->moving[d].forced[p] = forced_of(fl, p, 0, rows[d]);
     }
     for (int p = 0; p < more; p++) {
-        S->forced[1 + fl->n_terms + p] = amplitudes[p];
+        S->moving[0].forced[1 + fl->n_terms + p] = amplitudes[p];
         S->terms[fl->n_terms + p] = (Term){STEADY, orders[p], {0.0, 0.0}};
     }
 }

@@ -41,6 +41,58 @@ static double safe_step(double h, double h1, double h2, double bound)
     return larger(tau, 0.0);
 }
 
+/* largest value of |y|, |y'|, |y''| within a time, by the present ones and a bound of the third */
+static Course reach_within(Course at, double time)
+{
+    Course most = {0.0, 0.0, fabs(at.second) + at.bound * time, at.bound};
+    most.first = fabs(at.first) + time * (fabs(at.second) + 0.5 * at.bound * time);
+    most.value = fabs(at.value) + time * (fabs(at.first) + 0.5 * time * fabs(at.second) +
+                                          time * time * at.bound / 6.0);
+    return most;
+}
+
+/* |third derivative| of (x² + y²)/2c within a time */
+static double round_bound(const Flow *fl, int s, const Course *at, double time)
+{
+    double total = 0.0;
+    for (int d = 0; d < 2; d++) {
+        Course most = reach_within(at[d], time);
+        total += most.value * most.bound + 3.0 * most.first * most.second;
+    }
+    return total / stop_of(fl, s)->gap;
+}
+
+/* `gap_now` of an output (a stop's, or one that is watched in its place) in flight, after a time t,
+ * with a bound of its third rate for the time `holds` from then on */
+static Course gap_after(const Flow *fl, int stop, int out, const double *w, double phase, double t,
+                        double *holds)
+{
+    *holds = 2.0 * PI / fl->omega;
+    if (!is_round(fl, stop)) {
+        Course at = output_after(fl, out, w, phase, t);
+        at.value -= stop_of(fl, stop)->gap;
+        return at;
+    }
+    Course at[2];
+    double place[2], speed[2], pace[2], fastest = TINY;
+    for (int d = 0; d < 2; d++) {
+        int row = d == 0 ? stop : (int)stop_of(fl, stop)->second;
+        at[d] = output_after(fl, row, w, phase, t);
+        at[d].value -= stop_of(fl, row)->centre;
+        place[d] = at[d].value;
+        speed[d] = at[d].first;
+        pace[d] = at[d].second;
+        fastest = larger(fastest, at[d].bound);
+    }
+    Course found = around(fl, stop, place, speed, pace);
+    *holds = smaller(*holds, cbrt(stop_of(fl, stop)->gap / fastest));
+    double now = round_bound(fl, stop, at, 0.0);
+    double first = safe_step(smaller(found.value, 0.0), found.first, found.second, now);
+    if (first > 0.0) *holds = smaller(*holds, first);
+    found.bound = round_bound(fl, stop, at, *holds);
+    return found;
+}
+
 /* First time in [start, end] at which an output rises to the gap of a stop, or inf.
  *
  * Every step is bounded by the third derivative, so that it cannot cross a contact; the steps
@@ -50,12 +102,12 @@ static double safe_step(double h, double h1, double h2, double bound)
 static double rising_time(const Flow *fl, int stop, int out, const double *w, double phase,
                           double start, double end, double shortest)
 {
-    double longest = 2.0 * PI / fl->omega, noise = output_noise(fl, out, w), t = start;
+    double noise = gap_noise(fl, out, w), t = start, longest;
     for (int i = 0; i < MOST_STEPS; i++) {
         if (t > end) return INFINITY;
         if (isnan(t) || (i % 1024 == 1023 && interrupted(fl->watch))) return -1.0;
-        Course at = output_after(fl, out, w, phase, t);
-        double h = at.value - stop_of(fl, stop)->gap;
+        Course at = gap_after(fl, stop, out, w, phase, t, &longest);
+        double h = at.value;
         if (h >= 0.0 && at.first > 0.0) return t;
         double tau = safe_step(smaller(h, 0.0), at.first, at.second, at.bound);
         if (tau < shortest) {
@@ -64,7 +116,7 @@ static double rising_time(const Flow *fl, int stop, int out, const double *w, do
             tau = larger(shortest,
                          safe_step(smaller(h, 0.0) - noise, at.first, at.second, at.bound));
         }
-        t += smaller(tau, longest);
+        t += smaller(tau, larger(longest, shortest));
     }
     return -1.0;
 }
@@ -84,9 +136,9 @@ static double closing_time(const Flow *fl, int stop, const double *w, double pha
     return rising_time(fl, stop, stop, w, phase, start, end, shortest);
 }
 
-/* time in which the third derivative of an output cannot make more than a change of it */
-static double calm_time(const Flow *fl, int out, const double *w, double phase, double change)
+/* time in which the third derivative of a gap cannot make more than a change of it */
+static double calm_time(const Flow *fl, int stop, const double *w, double phase, double change)
 {
-    double bound = output_after(fl, out, w, phase, 0.0).bound;
-    return bound > 0.0 ? cbrt(6.0 * change / bound) : INFINITY;
+    double holds, bound = gap_after(fl, stop, stop, w, phase, 0.0, &holds).bound;
+    return smaller(holds, bound > 0.0 ? cbrt(6.0 * change / bound) : INFINITY);
 }

@@ -21,9 +21,9 @@ typedef struct {
 static Impact expected_contact(const Flow *fl, int s, const double *w, double phase)
 {
     const Stop *stop = stop_of(fl, s);
-    Course at = output_now(fl, s, w, phase);
-    double speed = at.first, accel = at.second, depth = larger(at.value - stop->gap, 0.0);
-    double p = stop->exponent, rate = stop->stiffness * stop->mobility;
+    Course at = depth_now(fl, s, w, phase);
+    double speed = at.first, accel = at.second, depth = larger(at.value, 0.0);
+    double p = stop->exponent, rate = stop->stiffness * mobility_now(fl, s, w, phase);
     double still = pow(larger(accel, 0.0) / rate, 1.0 / p);
     double energy = 0.5 * speed * speed + rate * (pow(depth, p + 1.0) + pow(still, p + 1.0)) / (p + 1.0);
     if (energy <= 0.0) return (Impact){0.0, 0.0, 0.0};
@@ -85,7 +85,8 @@ static void keep_profile(const Flow *fl, const Gauss *tab, int kind, int new_kin
         double *output = panel->output + (size_t)a * m, top = 0.0;
         stretch_profile(tab, kind, new_kind, ratio, output, guess);
         for (int i = 0; i < m; i++) top = larger(top, guess[i]);
-        bool pressed = is_elastic(fl, panel->active[a]) || is_rigid(fl, panel->active[a]);
+        int s = panel->active[a];
+        bool pressed = (is_elastic(fl, s) && !is_round(fl, s)) || is_rigid(fl, s);
         for (int i = 0; i < m; i++) output[i] = !pressed ? guess[i] : larger(guess[i], SMALLEST * top);
     }
 }
@@ -97,11 +98,11 @@ static Value creep(const Flow *fl, int s, const double *w, double phase, double 
 {
     Value none = {0.0, 0.0};
     if (fl->laws[s] != 0 || !depends_on_speed(fl, s)) return none;
-    Course at = output_now(fl, s, w, phase);
-    double depth = at.value - stop_of(fl, s)->gap;
+    Course at = depth_now(fl, s, w, phase);
+    double depth = at.value;
     if (at.first >= 0.0 || depth <= 0.0) return none;
     double viscosity = law(fl, s, depth, at.first).viscosity;
-    if (viscosity * stop_of(fl, s)->mobility * duration < CREEP) return none;
+    if (viscosity * mobility_now(fl, s, w, phase) * duration < CREEP) return none;
     return (Value){depth, at.first};
 }
 
@@ -159,12 +160,35 @@ typedef struct {
     double length;
 } Choice;
 
+/* turn guessed penetrations of a round clearance into displacements: it goes on around the centre
+ * as fast as now */
+static void guess_round(const Flow *fl, const Gauss *tab, double phase, const double *w,
+                        Choice choice, int a, Panel *panel)
+{
+    int m = panel->m, s = panel->active[a];
+    const Stop *stop = stop_of(fl, s);
+    double place[2], speed[2], pace[2];
+    round_now(fl, s, w, phase, place, speed, pace);
+    Polar at = polar(fl, s, place, speed);
+    double *first = panel->output + (size_t)a * m;
+    double *second = panel->output + (size_t)place_of(panel, (int)stop->second) * m;
+    double turning = at.radius > 0.0 ? at.across / at.radius : 0.0;
+    for (int i = 0; i < m; i++) {
+        Complex way = turned(turning * choice.length * tab->chi[choice.kind * m + i]);
+        double radius = stop->gap + stop->sense * first[i];
+        way = scaled(radius, product(complex_of(at.n[0], at.n[1]), way));
+        first[i] = way.re;
+        second[i] = way.im;
+    }
+}
+
 /* guess the outputs of one closed stop */
 static void guess_outputs(const Flow *fl, const Gauss *tab, double phase, const double *w,
                           Choice choice, int a, Panel *panel)
 {
     int m = panel->m, stop = panel->active[a];
     double *delta = panel->output + (size_t)a * m;
+    if (is_second(fl, stop)) return; /* with the first direction */
     if (is_bond(fl, stop) || (is_slider(fl, stop) && !is_held(fl, stop))) {
         hold_still(fl, phase, w, a, panel);
         return;
@@ -186,6 +210,7 @@ static void guess_outputs(const Flow *fl, const Gauss *tab, double phase, const 
     } else {
         for (int i = 0; i < m; i++) delta[i] = 0.0;
     }
+    if (is_round(fl, stop)) guess_round(fl, tab, phase, w, choice, a, panel);
 }
 
 /* Choose the kind and length of a panel and guess its penetrations; h bounds the length, h_mapped

@@ -38,9 +38,16 @@ static bool is_held(const Flow *fl, int s)
     return is_rigid(fl, s) || (is_slider(fl, s) && fl->slides[s] == 0);
 }
 
+/* whether a row is the first direction of a round clearance, or the second */
+static bool is_round(const Flow *fl, int s) { return stop_of(fl, s)->second >= 0.0; }
+
+static bool is_second(const Flow *fl, int s) { return stop_of(fl, s)->lead >= 0.0; }
+
+static bool is_planar(const Flow *fl, int s) { return is_round(fl, s) || is_second(fl, s); }
+
 static bool is_elastic(const Flow *fl, int s)
 {
-    return !(is_rigid(fl, s) || is_slider(fl, s) || is_bond(fl, s));
+    return !(is_rigid(fl, s) || is_slider(fl, s) || is_bond(fl, s) || is_second(fl, s));
 }
 
 /* whether a stop presses a slider on, in place of a constant force */
@@ -181,6 +188,7 @@ static bool depends_on_speed(const Flow *fl, int s)
 static bool needs_speed(const Flow *fl, int s)
 {
     bool needed = depends_on_speed(fl, s) || is_slider(fl, s); /* whose rate tells when it sticks */
+    needed = needed || stop_of(fl, s)->rub != 0.0;             /* or turns */
     for (int c = 0; c < fl->n_parameters; c++) {
         int64_t column = fl->parameters[2 * c];
         bool viscous = column == DISSIPATION || column == DASHPOT;
@@ -207,5 +215,6 @@ static double law_by(const Flow *fl, int s, int64_t column, double delta, double
 static bool singular_slope(const Flow *fl, int s)
 {
     double exponent = stop_of(fl, s)->exponent;
-    return (fl->laws[s] != 0 || exponent != floor(exponent)) && !is_rigid(fl, s);
+    bool broken = fl->laws[s] != 0 || exponent != floor(exponent);
+    return broken && !is_rigid(fl, s) && !is_second(fl, s);
 }

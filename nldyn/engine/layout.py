@@ -11,8 +11,8 @@ from nldyn.base.arrays import Complex, Real
 
 (
     OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL, ROUNDED,
-    TOO_MANY_STEPS, OTHER_CONTACTS, INTERRUPTED, OUT_OF_MEMORY,
-) = range(12)  # fmt: skip
+    TOO_MANY_STEPS, OTHER_CONTACTS, INTERRUPTED, OUT_OF_MEMORY, SLIDING_TURNS,
+) = range(13)  # fmt: skip
 ROUND = 1.5  # below this exponent a slope sets in almost at once: nodes at the switch count
 
 
@@ -38,6 +38,12 @@ class StopRow(NamedTuple):
     belt: float = 0.0  # speed of what it slides on
     normal: float = -1.0  # stop whose force presses it on, or -1
     pressing: float = 0.0  # force that does so in place of a stop's
+    second: float = -1.0  # of a round clearance: row of its second direction, or -1
+    lead: float = -1.0  # of that: row of the first one, or -1
+    centre: float = 0.0  # of both: displacement along them of the centre
+    sense: float = 1.0  # 1 for a ring, in which the body is, -1 for a pin, around which it is
+    rub: float = 0.0  # coefficient of friction in the sense of sliding, from first to second
+    surface: float = 0.0  # speed in that sense of the surface on that of the other side
 
 
 FIRST_POWER = len(
@@ -48,8 +54,8 @@ FIRST_POWER = len(
 class SystemData(NamedTuple):
     """Numbers of a system, as the engine needs them.
 
-    Outputs are the penetrations of the stops and the displacements of sliders and bonds, then the
-    observed displacements.
+    Outputs are the penetrations of the stops, the displacements of sliders and bonds and those
+    along the second directions of round clearances, then the observed displacements.
     """
 
     blocks: Real  # (n, 2, 2)

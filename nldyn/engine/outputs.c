@@ -171,10 +171,13 @@ static Course output_after(const Flow *fl, int out, const double *w, double phas
     return found;
 }
 
-/* penetration of a stop, negative when it is open */
-static double distance(const Flow *fl, int stop, const double *w, double phase)
+/* speed that a unit impulse at another stop takes from the closing of a stop's gap, in 1/kg */
+static double between(const Flow *fl, int stop, int other)
 {
-    return output_now(fl, stop, w, phase).value - stop_of(fl, stop)->gap;
+    double mobility = 0.0;
+    const double *row = row_of(fl, 1, stop), *push = push_of(fl, other);
+    for (int k = 0; k < fl->size; k++) mobility += row[k] * push[k];
+    return mobility;
 }
 
 /* size of a term of the response in an output */

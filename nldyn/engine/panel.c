@@ -21,8 +21,10 @@ static void renew_panel(const Flow *fl, Panel *panel, const int *active, int na)
 {
     panel->na = na;
     panel->outputs = na;
+    panel->round = false;
     for (int a = 0; a < na; a++) {
         panel->active[a] = active[a];
+        panel->round = panel->round || is_round(fl, active[a]);
         if (needs_speed(fl, active[a])) panel->outputs = 2 * na;
     }
     for (int i = 0; i < panel->outputs * panel->m; i++) panel->output[i] = 0.0;
@@ -45,15 +47,6 @@ static bool same_stops(const Panel *panel, const int *active, int na)
 static int output_order(const Flow *fl, int stop, int rate)
 {
     return rate == 0 && is_held(fl, stop) ? 2 : rate;
-}
-
-/* speed that a unit impulse at another stop takes from the closing of a stop's gap, in 1/kg */
-static double between(const Flow *fl, int stop, int other)
-{
-    double mobility = 0.0;
-    const double *row = row_of(fl, 1, stop), *push = push_of(fl, other);
-    for (int k = 0; k < fl->size; k++) mobility += row[k] * push[k];
-    return mobility;
 }
 
 /* whether a slider moves as another stop does */
@@ -198,14 +191,6 @@ static void free_outputs(const Flow *fl, const Gauss *tab, int kind, double phas
                              s->step, s->free + (size_t)o * m);
 }
 
-/* place of a stop among the closed ones */
-static int place_of(const Panel *panel, int stop)
-{
-    int place = 0;
-    while (panel->active[place] != stop) place++;
-    return place;
-}
-
 /* that of the one that presses a closed slider on, or -1 */
 static int pressing_place(const Flow *fl, const Panel *panel, int a)
 {
@@ -247,6 +232,8 @@ static void panel_forces(const Flow *fl, Panel *panel, double *slope)
         const double *delta = panel->output + (size_t)a * m;
         const double *speed = rates ? panel->output + (size_t)(na + a) * m : NULL;
         double *viscosity = rates ? slope + (size_t)(na + a) * m : NULL;
+        if (is_round(fl, panel->active[a])) round_forces(fl, panel, a, slope);
+        if (panel->round && partner_of(fl, panel, a) >= 0) continue;
         closed_laws(fl, panel->active[a], m, delta, speed, panel->F + (size_t)a * m,
                     slope + (size_t)a * m, viscosity);
     }
@@ -267,7 +254,7 @@ static void invert_panel(const Flow *fl, Panel *panel)
 {
     int width = panel->na * panel->m, height = panel->outputs * panel->m, pad = padded(width);
     const double *slope = panel->slope, *rates = slope + width;
-    bool same = height == width;
+    bool same = height == width && !panel->round;
     for (int p = 0; p < height && same; p++) same = slope[p] == panel->inverted[p];
     if (same) return;
     memcpy(panel->inverted, slope, sizeof(double) * height);
@@ -279,6 +266,9 @@ static void invert_panel(const Flow *fl, Panel *panel)
             for (int p = 0; p < width; p++) column[p] -= rates[p] * G[width + p];
         for (int p = width; p < pad; p++) column[p] = 0.0;
     }
+    for (int o = 0; o < panel->outputs; o++)
+        add_crossed(fl, panel, o, -1.0, panel->G + o * panel->m, height, 1, panel->inverse, pad, 1,
+                    width);
     add_friction(fl, panel, panel->inverse, width, pad, 1);
     for (int q = 0; q < width; q++) panel->inverse[(size_t)q * pad + q] += 1.0;
     invert(panel->inverse, width, panel->order);
@@ -303,15 +293,19 @@ static void guess_rates(const Flow *fl, Panel *panel, Scratch *s)
 }
 
 /* rounding error of stop a's force at node i by what all forces (na m,) have moved so far */
-static double rounded_force(const Panel *panel, const double *force, int a, int i)
+static double rounded_force(const Flow *fl, const Panel *panel, const double *force, int a, int i)
 {
-    int width = panel->na * panel->m, height = panel->outputs * panel->m;
+    int na = panel->na, width = na * panel->m, height = panel->outputs * panel->m;
+    int partner = panel->round ? partner_of(fl, panel, a) : -1;
     double error = 0.0;
-    for (int o = a; o < panel->outputs; o += panel->na) {
+    for (int o = 0; o < panel->outputs; o++) {
+        if (o % na != a && o % na != partner) continue;
         double moved = 0.0;
         const double *G = panel->G + o * panel->m + i;
         for (int p = 0; p < width; p++) moved += fabs(G[(size_t)p * height] * force[p]);
-        error += SUM_ROUNDING * moved * fabs(panel->slope[o * panel->m + i]);
+        double slope = o % na == a ? panel->slope[o * panel->m + i]
+                                   : crossed(panel, panel->slope, o, a)[i];
+        error += SUM_ROUNDING * moved * fabs(slope);
     }
     return error;
 }
@@ -325,13 +319,17 @@ static bool consistent(const Flow *fl, const Panel *panel, const double *force,
         double allowed = SETTLED * largest(panel->F + (size_t)a * m, m);
         for (int o = a; o < panel->outputs; o += na)
             allowed += 10.0 * noise[o] * largest(panel->slope + (size_t)o * m, m);
+        int partner = panel->round ? partner_of(fl, panel, a) : -1;
+        if (partner >= 0) allowed += SETTLED * largest(panel->F + (size_t)partner * m, m);
+        for (int o = partner; o >= 0 && o < panel->outputs; o += na)
+            allowed += 10.0 * noise[o] * largest(crossed(panel, panel->slope, o, a), m);
         int normal = pressing_place(fl, panel, a);
         for (int o = normal; o >= 0 && o < panel->outputs; o += na)
             allowed += 10.0 * grip(fl, panel->active[a]) * noise[o] *
                        largest(panel->slope + (size_t)o * m, m);
         for (int i = 0; i < m; i++) {
             double off = fabs(panel->F[a * m + i] - force[a * m + i]);
-            if (off > allowed && off > allowed + rounded_force(panel, force, a, i)) return false;
+            if (off > allowed && off > allowed + rounded_force(fl, panel, force, a, i)) return false;
         }
     }
     return true;
@@ -354,8 +352,11 @@ static void step_forces(const Flow *fl, Panel *panel, Scratch *s, int iteration)
         for (int o = 0; o < panel->outputs; o += panel->na)
             for (int p = 0; p < width; p++) {
                 int place = o * panel->m + p;
-                s->step[p] += panel->slope[place] * (s->led[place] - panel->output[place]);
+                s->led[place] -= panel->output[place];
+                s->step[p] += panel->slope[place] * s->led[place];
             }
+        for (int o = 0; o < panel->outputs; o++)
+            add_crossed(fl, panel, o, 1.0, s->led + o * panel->m, 0, 1, s->step, 0, 1, 1);
         add_friction(fl, panel, s->step, 1, 1, 1);
     }
     combine(s->led, s->solved, width, panel->inverse, padded(width), s->step, 1, width);
@@ -364,7 +365,7 @@ static void step_forces(const Flow *fl, Panel *panel, Scratch *s, int iteration)
 
 /* put the outputs that the forces lead to in their place; their largest relative change beyond
  * `noise`, or nan */
-static double renew_outputs(Panel *panel, const Scratch *s, const double *noise)
+static double renew_outputs(const Flow *fl, Panel *panel, const Scratch *s, const double *noise)
 {
     int m = panel->m;
     double change = 0.0;
@@ -380,6 +381,7 @@ static double renew_outputs(Panel *panel, const Scratch *s, const double *noise)
             *output = value;
         }
         if (!isfinite(total)) return NAN; /* a maximum may pass over nan */
+        if (panel->round && o < panel->na) scale = deepest_of(fl, panel, o);
         if (o < panel->na && longest > noise[o]) change = larger(change, longest / scale);
     }
     return change;
@@ -393,7 +395,7 @@ static double renew_outputs(Panel *panel, const Scratch *s, const double *noise)
 static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase, const double *w,
                         double h, const double *noise, Panel *panel, Scratch *s)
 {
-    int count = panel->outputs * panel->m;
+    int count = panel->outputs * panel->m * (panel->round ? 2 : 1);
     panel_responses(fl, tab, kind, h, panel, s);
     free_outputs(fl, tab, kind, phase, w, h, panel, s);
     if (panel->outputs > panel->na) guess_rates(fl, panel, s);
@@ -407,7 +409,7 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
             panel->kept = true;
         }
         step_forces(fl, panel, s, iteration);
-        double change = renew_outputs(panel, s, noise);
+        double change = renew_outputs(fl, panel, s, noise);
         if (isnan(change)) break;
         /* the error left: goes with the square after a step with a fresh matrix, else linearly;
          * nothing moves where forces are too weak to: they may still not be the penetrations' */

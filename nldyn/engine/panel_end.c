@@ -34,7 +34,7 @@ static void hold_speeds(const Flow *fl, const Gauss *tab, int kind, double end_p
     if (largest(panel->decay, na) <= DECAY) return;
     for (int a = 0; a < na; a++) {
         s->viscosity[a] = s->off[a] = 0.0;
-        if (!(panel->decay[a] > DECAY)) continue;
+        if (!(panel->decay[a] > DECAY) || is_planar(fl, panel->active[a])) continue;
         double speed = output_now(fl, panel->active[a], w_end, end_phase).first, gained = 0.0;
         s->viscosity[a] = law(fl, panel->active[a], panel->end_depth[a], speed).viscosity;
         for (int i = 0; i < m; i++)
@@ -93,11 +93,19 @@ static void panel_end(const Flow *fl, const Gauss *tab, int kind, double phase, 
 /* add to the forces' sensitivities at the node of output o what the excitation and the stop's own
  * parameters do */
 static void add_node_columns(const Flow *fl, double node_phase, double t, const Panel *panel,
-                             int o, int i, int n_columns, double *forces)
+                             int o, int i, int n_columns, Scratch *s)
 {
     int na = panel->na, m = panel->m, stop = panel->active[o % na];
+    double *forces = s->forces + (size_t)((o % na) * m + i) * n_columns;
     int order = output_order(fl, stop, o / na);
     add_forced_by(fl, stop, order, node_phase, t, panel->slope[o * m + i], forces, n_columns);
+    if (is_planar(fl, stop)) {
+        if (is_round(fl, stop) && order == 0) add_round_columns(fl, panel, o, i, n_columns, s->forces);
+        int partner = partner_of(fl, panel, o % na);
+        add_forced_by(fl, stop, order, node_phase, t, crossed(panel, panel->slope, o, partner)[i],
+                      s->forces + (size_t)(partner * m + i) * n_columns, n_columns);
+        return;
+    }
     for (int c = 0; c < fl->n_parameters && order == 0; c++) {
         int64_t column = fl->parameters[2 * c];
         if (fl->parameters[2 * c + 1] != stop || column < GAP) continue;
@@ -130,8 +138,9 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
             double *forces = s->forces + (size_t)((o % na) * m + i) * n_columns;
             double slope = panel->slope[o * m + i], t = h * tab->chi[kind * m + i];
             for (int c = 0; c < n_columns; c++) forces[c] += slope * s->part[i * n_columns + c];
-            add_node_columns(fl, phase + fl->omega * t, t0 + t, panel, o, i, n_columns, forces);
+            add_node_columns(fl, phase + fl->omega * t, t0 + t, panel, o, i, n_columns, s);
         }
+        add_crossed(fl, panel, o, 1.0, s->part, 1, n_columns, s->forces, 1, n_columns, n_columns);
     }
     add_friction(fl, panel, s->forces, n_columns, 1, n_columns);
     invert_panel(fl, panel);

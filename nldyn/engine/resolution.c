@@ -135,17 +135,47 @@ static void fill_response_tails(const Flow *fl, const Gauss *tab, const Panel *p
     }
 }
 
+/* largest penetration at the nodes */
+static double deepest_of(const Flow *fl, const Panel *panel, int a)
+{
+    int first = is_second(fl, panel->active[a]) ? partner_of(fl, panel, a) : a;
+    bool round = is_round(fl, panel->active[first]);
+    return largest((round ? panel->radial : panel->output) + (size_t)first * panel->m, panel->m);
+}
+
+/* largest of numbers (na, m) of a stop, of both directions at a round clearance */
+static double largest_of(const Flow *fl, const Panel *panel, const double *values, int a)
+{
+    int m = panel->m, partner = panel->round ? partner_of(fl, panel, a) : -1;
+    double found = largest(values + (size_t)a * m, m);
+    return partner < 0 ? found : larger(found, largest(values + (size_t)partner * m, m));
+}
+
+/* Legendre tail (value) and largest (slope) of what a stop's force changes by, times dχ/ds */
+static Value slope_tail(const Flow *fl, const Gauss *tab, const Panel *panel, const double *slopes,
+                        int o)
+{
+    int na = panel->na, m = panel->m, a = o % na;
+    const double *by = slopes + (size_t)(o - a) * m;
+    Value found = {legendre_tail(tab, slopes + (size_t)o * m), largest_of(fl, panel, by, a)};
+    if (!is_planar(fl, panel->active[a])) return found;
+    const double *cross = by + (size_t)panel->outputs * m;
+    found.value = larger(found.value, legendre_tail(tab, cross + (size_t)a * m));
+    found.slope = larger(found.slope, largest_of(fl, panel, cross, a));
+    return found;
+}
+
 /* whether the force (o < na) and the slope of an output are resolved */
 static bool output_resolved(const Flow *fl, const Gauss *tab, int kind, double h,
                             const double *noise, const Panel *panel, const Scratch *s, int o)
 {
     int na = panel->na, m = panel->m, a = o % na, closed = panel->active[a];
     const Stop *stop = stop_of(fl, closed);
-    const double *F = panel->F + (size_t)a * m, *slopes = s->slopes + (size_t)o * m;
-    double deepest = largest(panel->output + (size_t)a * m, m);
+    const double *F = panel->F + (size_t)a * m;
+    const double *depths = (is_round(fl, closed) ? panel->radial : panel->output) + (size_t)a * m;
+    double deepest = deepest_of(fl, panel, a), strongest = largest_of(fl, panel, panel->F, a);
     if (deepest <= 10.0 * noise[a]) return true;
-    if (o < na && singular_slope(fl, closed) &&
-        nearly_opens(tab, kind, panel->output + (size_t)a * m, 10.0 * noise[a]))
+    if (o < na && singular_slope(fl, closed) && nearly_opens(tab, kind, depths, 10.0 * noise[a]))
         return false;
     double goal = panel->decay[a] <= DECAY ? fl->tail : DAMPED_TAIL * fl->tail; /* hold_speeds */
     if (1.0 < stop->exponent && stop->exponent < ROUND) goal *= SHARP_TAIL;
@@ -156,18 +186,19 @@ static bool output_resolved(const Flow *fl, const Gauss *tab, int kind, double h
     if (is_bond(fl, closed)) shake = BLIND * noise[a] * largest(panel->slope + (size_t)a * m, m);
     if (o < na && na < panel->outputs)
         shake += BLIND * noise[na + a] * largest(panel->slope + (size_t)(na + a) * m, m);
-    if (o < na && legendre_tail(tab, F) > tail * largest(F, m) + shake) return false;
+    if (o < na && legendre_tail(tab, F) > tail * strongest + shake) return false;
     shake *= stop->exponent / deepest * largest(tab->slope + (size_t)kind * m, m);
-    double size = largest(slopes, m), fastest = largest(panel->output + (size_t)o * m, m);
+    Value slopes = slope_tail(fl, tab, panel, s->slopes, o);
+    double size = slopes.slope, fastest = largest_of(fl, panel, panel->output + (size_t)(o - a) * m, a);
     if (o >= na && fastest > 0.0) /* by speed: its share in the force counts */
-        size = larger(size, largest(F, m) / fastest);
+        size = larger(size, strongest / fastest);
     double kick = 1.0;
     if (o < na && !is_held(fl, closed)) {
-        kick = KICK * stop->mobility * largest(panel->slope + (size_t)o * m, m);
+        kick = KICK * stop->mobility * largest_of(fl, panel, panel->slope + (size_t)(o - a) * m, a);
         kick = larger(kick * h / fl->omega, 1.0);
     }
     tail = larger(goal * fl->tail / (s->swayed[a] * sqrt(kick)), floor);
-    return !(legendre_tail(tab, slopes) > 4.0 * (tail * size + shake));
+    return !(slopes.value > 4.0 * (tail * size + shake));
 }
 
 /* Whether the Legendre tails of each force and of its slopes are small beside their largest.
@@ -182,7 +213,7 @@ static bool resolved(const Flow *fl, const Gauss *tab, int kind, double h, const
 {
     if (sways_unseen(fl, tab, kind, h, panel)) return false;
     const double *stretch = tab->slope + (size_t)kind * panel->m;
-    for (int o = 0; o < panel->outputs; o++)
+    for (int o = 0; o < panel->outputs * (panel->round ? 2 : 1); o++)
         for (int i = 0; i < panel->m; i++)
             s->slopes[o * panel->m + i] = panel->slope[o * panel->m + i] * stretch[i];
     fill_response_tails(fl, tab, panel, s);
@@ -202,7 +233,8 @@ static bool shows_decay(const Flow *fl, const Gauss *tab, int kind, double h, Pa
         for (int i = 0; i < m; i++)
             total += h * tab->weights[kind * m + i] * (mobility * panel->slope[o * m + i]);
         panel->decay[a] = total;
-        shown = shown && (total <= DECAY || panel->decayed[a] > FADED);
+        bool faded = panel->decayed[a] > FADED && !is_planar(fl, panel->active[a]);
+        shown = shown && (total <= DECAY || faded);
     }
     return shown;
 }

@@ -49,8 +49,7 @@ static void contact_forces(const Motion *M, double phase)
     for (int s = 0; s < n; s++) {
         Course at = output_now(fl, s, M->w, phase);
         rates[s] = at.second;
-        forces[s] =
-            M->closed[s] ? law(fl, s, at.value - stop_of(fl, s)->gap, at.first).force : 0.0;
+        forces[s] = M->closed[s] ? force_now(fl, s, M->w, phase) : 0.0;
         if (M->closed[s] && is_pressed(fl, s)) /* it comes after what presses it on */
             forces[s] = sliding_law(fl, s, at.first, forces[(int)stop_of(fl, s)->normal]).force;
     }

@@ -41,7 +41,8 @@ static void switch_stop(Motion *M, int stop, double phase, double t)
 {
     M->closed[stop] = !M->closed[stop];
     for (int s = stop + 1; s < M->fl->n_stops; s++) {
-        if (!is_pressed(M->fl, s) || (int)stop_of(M->fl, s)->normal != stop) continue;
+        bool follows = is_pressed(M->fl, s) && (int)stop_of(M->fl, s)->normal == stop;
+        if (!follows && !(is_second(M->fl, s) && (int)stop_of(M->fl, s)->lead == stop)) continue;
         M->closed[s] = M->closed[stop];
         M->fl->slides[s] = 0;
     }
@@ -115,7 +116,7 @@ static int fly(Motion *M, double here)
     double first = M->duration - M->t;
     int stop = -1;
     for (int s = 0; s < fl->n_stops; s++) {
-        if (is_slider(fl, s)) continue; /* nothing presses it on */
+        if (is_slider(fl, s) || is_second(fl, s)) continue; /* nothing presses it on */
         double at = closing_time(fl, s, M->w, here, M->skips[s], first, M->shortest);
         if (at < 0.0) return fl->watch->stopped ? INTERRUPTED : TOO_MANY_STEPS;
         if (at < first) {
@@ -138,7 +139,7 @@ static bool pass_touch(Motion *M, int stop, double here, int *status)
 {
     const Flow *fl = M->fl;
     Impact hit = expected_contact(fl, stop, M->w, here);
-    double noise = output_noise(fl, stop, M->w);
+    double noise = gap_noise(fl, stop, M->w);
     if (lost_to_rounding(fl, stop, M->w, hit.peak, noise) > WORST_ROUNDING) *status = ROUNDED;
     if (*status != GOES_ON || !(hit.peak <= 100.0 * noise)) return false;
     switch_stop(M, stop, here, M->t);
@@ -157,7 +158,7 @@ static void carry_depths(Motion *M, double here)
         int stop = panel->active[a];
         double noise = output_noise(M->fl, stop, M->w);
         if (M->doubt[stop] >= noise) {
-            double value = distance(M->fl, stop, M->w, here);
+            double value = output_now(M->fl, stop, M->w, here).value - origin_of(M->fl, stop);
             bool begins = M->start_switch == 1 && fabs(value) <= noise;
             M->depth[stop] = begins ? 0.0 : value;
             M->doubt[stop] = begins ? 0.0 : noise;
@@ -182,6 +183,7 @@ static int take_panel(Motion *M, double here, const Trial *trial)
     const Flow *fl = M->fl;
     double h = trial->h;
     if (!end_is_finite(M)) return CONTACT_FAILED;
+    if (sliding_turns(M, here, h)) return SLIDING_TURNS;
     if (M->recording && !record_panel(M, here, h, trial->kind, trial->aim)) return RECORD_FULL;
     for (int a = 0; a < panel->na; a++) {
         if (HALF_ULP * panel->decay[a] > WORST_ROUNDING) return ROUNDED;
@@ -211,7 +213,7 @@ static int touch(Motion *M, double here, int na)
     int stop = M->active[0], status = GOES_ON;
     double remain = M->duration - M->t;
     if (!same_stops(panel, M->active, na)) renew_panel(fl, panel, M->active, na);
-    if (na == 1 && M->start_switch == 1 && is_elastic(fl, stop)) {
+    if (na == (is_round(fl, stop) ? 2 : 1) && M->start_switch == 1 && is_elastic(fl, stop)) {
         bool passed = pass_touch(M, stop, here, &status);
         if (passed || status != GOES_ON) return status;
     }
@@ -248,14 +250,16 @@ static void begin_pieces(Motion *M, double fastest)
     M->shortest = larger(SHORTEST / larger(fastest, fl->omega), SUM_ROUNDING * M->duration);
     M->t = 0.0;
     M->start_switch = 0;
-    M->bonded = n_stops > 0 && is_bond(fl, n_stops - 1);
+    M->bonded = false;
     M->reach = INFINITY;
     renew_panel(fl, M->panel, M->active, 0);
     for (int s = 0; s < n_stops; s++) {
         M->skips[s] = M->depth[s] = 0.0;
         M->doubt[s] = INFINITY;
         M->last_push[s] = NAN;
-        if (is_bond(fl, s)) M->reach = smaller(M->reach, bond_length(fl, s, M->w, M->phase));
+        if (!is_bond(fl, s)) continue;
+        M->bonded = true;
+        M->reach = smaller(M->reach, bond_length(fl, s, M->w, M->phase));
     }
 }
 
@@ -286,13 +290,14 @@ static void begin_contacts(Motion *M)
 {
     const Flow *fl = M->fl;
     for (int s = 0; s < fl->n_stops; s++) {
-        Course at = output_now(fl, s, M->w, M->phase);
-        double left = at.first < 0.0 ? output_noise(fl, s, M->w) : 0.0; /* it opens now */
-        bool shut = at.value - stop_of(fl, s)->gap > left && is_elastic(fl, s);
+        Course at = gap_now(fl, s, M->w, M->phase);
+        double left = at.first < 0.0 ? gap_noise(fl, s, M->w) : 0.0; /* it opens now */
+        bool shut = at.value > left && is_elastic(fl, s);
         fl->slides[s] = 0;
         M->closed[s] = is_bond(fl, s) || shut;
         if (is_slider(fl, s))
             M->closed[s] = !is_pressed(fl, s) || M->closed[(int)stop_of(fl, s)->normal];
+        if (is_second(fl, s)) M->closed[s] = M->closed[(int)stop_of(fl, s)->lead];
         if (!(never_pulls(fl, s) && M->closed[s])) continue;
         int release = (int)stop_of(fl, s)->release;
         at = output_now(fl, release, M->w, M->phase);

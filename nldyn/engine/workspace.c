@@ -59,7 +59,8 @@ static void lay_out_panel(Block *block, const Flow *fl, int m, Panel *panel)
     panel->active = indices(block, na);
     panel->output = numbers(block, outputs);
     panel->F = numbers(block, nodes);
-    panel->slope = numbers(block, outputs);
+    panel->slope = numbers(block, 2 * outputs);
+    panel->radial = numbers(block, nodes);
     panel->inverted = numbers(block, outputs);
     panel->there = numbers(block, 2 * size * m);
     panel->to = numbers(block, outputs * size);
@@ -83,7 +84,7 @@ static void lay_out_contacts(Block *block, const Flow *fl, const Gauss *tab, Scr
     s->waves = numbers(block, 10 * m);
     s->product = numbers(block, m * m);
     s->free = numbers(block, 2 * nodes);
-    s->new_slope = numbers(block, 2 * nodes);
+    s->new_slope = numbers(block, 4 * nodes);
     s->solved = numbers(block, nodes);
     s->step = numbers(block, nodes);
     s->led = numbers(block, 2 * nodes);
@@ -94,7 +95,7 @@ static void lay_out_contacts(Block *block, const Flow *fl, const Gauss *tab, Scr
     s->values = numbers(block, m + 2);
     s->fine = numbers(block, tab->n_fine);
     s->driven = numbers(block, size * m);
-    s->slopes = numbers(block, 2 * nodes);
+    s->slopes = numbers(block, 4 * nodes);
     s->forced = numbers(block, na);
     s->swayed = numbers(block, na);
     s->square = numbers(block, size * m);

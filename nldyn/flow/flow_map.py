@@ -37,6 +37,7 @@ from nldyn.engine.layout import (
     RECORD_FULL,
     ROUNDED,
     SINGULAR,
+    SLIDING_TURNS,
     TOO_MANY_PIECES,
     TOO_MANY_STEPS,
     Record,
@@ -49,7 +50,7 @@ from nldyn.engine.newton import Corrector, Found, newton, packed_record, packed_
 from nldyn.engine.sample import local_extremes, sample_states
 from nldyn.flow.gauss import GaussTables, gauss_tables
 from nldyn.flow.options import FlowOptions, _floats, _nodes_for_switch
-from nldyn.flow.packing import bond_row, parameter_tables, slider_row, stop_row
+from nldyn.flow.packing import bond_row, parameter_tables, second_row, slider_row, stop_row
 from nldyn.system.contact_law import law_address
 from nldyn.system.linear import ForcedResponse
 from nldyn.system.parameters import Parameter
@@ -71,6 +72,8 @@ _REASONS = {
     SINGULAR: "singular Jacobian",
     NOT_CONVERGED: "Newton's method did not converge",
     OTHER_CONTACTS: "the number of contacts changes within the step",
+    SLIDING_TURNS: "the whirl takes the sliding speed in a round clearance through zero: there the "
+    "surface would stick or slide the other way, which is not known",
 }
 
 
@@ -248,7 +251,8 @@ class FlowMap:
     def rows(self) -> Real:
         """Output rows (n_out, 2n): penetrations, displacements of sliders, bonds, interfaces.
 
-        Then, of each stop that never pulls, its force over its stiffness.
+        Of a round clearance there are those along both directions, see `round_rows`. Then, of each
+        stop that never pulls, its force over its stiffness.
         """
         s = self.system
         vectors = [*self._pushed, *s.participation.values()]
@@ -261,14 +265,18 @@ class FlowMap:
 
     @cached_property
     def _pushed(self) -> list[Real]:
-        """Modal vectors (n,) of what the forces of stops, sliders and bonds push, in this order."""
+        """Modal vectors (n,) of what forces push, in this order.
+
+        Those of stops, sliders and bonds, and along the second directions of round clearances.
+        """
         s = self.system
         between = [(e.at, e.against) for e in s.sliders] + [(e.at, e.against) for e in s.bonds]
+        between += [stop.ends[1] for stop in s.round_stops.values()]
         return [s.stop_vector(stop) for stop in s.stops] + [s.vector_between(*e) for e in between]
 
     @cached_property
     def force_columns(self) -> Real:
-        """What the forces of stops, sliders and bonds do to the rates of z, (2n, n_forces)."""
+        """What the forces of `_pushed` do to the rates of z, (2n, n_forces)."""
         columns = [self.system.force_column(v) for v in self._pushed]
         return np.ascontiguousarray(np.array(columns).reshape(-1, 2 * self.system.size).T)
 
@@ -283,8 +291,36 @@ class FlowMap:
     def first_alike(self) -> list[int]:
         """For each output the first one of the same row: an interface may be where a stop is."""
         riding = len(self.rows) if self.system.rides else 0
-        keys = [(place if riding else None, row.tobytes()) for place, row in enumerate(self.rows)]
+        keys = [
+            (place if riding or place in self.system.round_stops else None, row.tobytes())
+            for place, row in enumerate(self.rows)
+        ]
         return [keys.index(key) for key in keys]
+
+    def outputs_at(self, output: int, states: Real) -> Real:
+        """An output (k,) at states z (k, 2n), without what a moving base adds.
+
+        Of a stop it is the penetration without its gap.
+        """
+        stop = self.system.round_stops.get(output)
+        if stop is None:
+            return np.asarray((states * self.rows[output]).sum(axis=1))
+        return self.system.round_polar(stop, self.to_modal(states)).depth + stop.gap
+
+    def output_row(self, output: int, state: Real) -> Real:
+        """Derivative (2n,) of an output by the state z (2n,)."""
+        stop = self.system.round_stops.get(output)
+        if stop is None:
+            return np.asarray(self.rows[output])
+        normal = self.system.round_polar(stop, self.to_modal(state[None])).normal[0]
+        return np.asarray(stop.sense * normal @ self.rows[self.round_rows[output]])
+
+    @cached_property
+    def round_rows(self) -> dict[int, list[int]]:
+        """The outputs along both directions of the round clearances."""
+        numbers = list(self.system.round_stops)
+        first = len(self._pushed) - len(numbers)
+        return {stop: [stop, first + place] for place, stop in enumerate(numbers)}
 
     @cached_property
     def rate_rows(self) -> Real:
@@ -332,8 +368,12 @@ class FlowMap:
         first_bond = len(stops)
         stops += [
             bond_row(bond, float(v @ v))
-            for bond, v in zip(s.bonds, vectors[first_bond:], strict=True)
+            for bond, v in zip(s.bonds, vectors[first_bond:], strict=False)
         ]
+        for i, (_, second) in self.round_rows.items():
+            v = vectors[second]
+            stops[i] = stops[i]._replace(second=float(second))
+            stops.append(second_row(s.round_stops[i], i, float(v @ v), self.options))
         powers = np.zeros((len(stops), max((len(b.coefficients) for b in s.bonds), default=0)))
         for row, bond in enumerate(s.bonds, first_bond):
             powers[row, : len(bond.coefficients)] = bond.coefficients
@@ -590,7 +630,7 @@ class FlowMap:
             sensitivities, table, drive_by, corrector or _NONE, 2 * self.system.size,
             len(self._pushed),
         )  # fmt: skip
-        if self.system.bonds or self.system.sliders:  # which come after the stops, and never close
+        if len(self._pushed) > len(self.system.stops):  # what comes after the stops never closes
             return found._replace(closings=found.closings[: len(self.system.stops)])
         return found
 
@@ -815,8 +855,28 @@ class Trajectory:
         phases = found[order[inside], 0]
         carried = self.flow.ride(output, self.omega).at(phases)
         # BLAS would sum in an order that depends on how many are wanted
-        exact[order[inside], 1] = (solved * self.flow.rows[output]).sum(axis=1) + carried
+        exact[order[inside], 1] = self.flow.outputs_at(output, solved) + carried
         return exact
+
+    @cached_property
+    def contacts_at_nodes(self) -> tuple[Real, Real]:
+        """Penetrations and normal forces (n_pieces, n_stops, m) at the nodes of contact panels.
+
+        Zero where a stop is open. Those of a stop that is held are accelerations.
+        """
+        stops, rec = len(self.flow.system.stops), self.record
+        depth, force = rec.depth[:, :stops], rec.force[:, :stops]
+        if not self.flow.round_rows:
+            return depth, force
+        depth, force = depth.copy(), force.copy()
+        for i, rows in self.flow.round_rows.items():
+            stop = self.flow.system.round_stops[i]
+            radius = np.hypot(*(rec.depth[:, row] for row in rows))
+            closed = np.asarray(rec.depth[:, rows].any(axis=(1, 2))).reshape(-1, 1)
+            size = np.hypot(*(rec.force[:, row] for row in rows)) / math.hypot(1.0, stop.friction)
+            depth[:, i] = np.where(closed, stop.sense * radius - stop.gap, 0.0)
+            force[:, i] = np.where(closed, size, 0.0)
+        return depth, force
 
     def contact_quadrature(self) -> tuple[Real, Real]:
         """Forcing phases (k,) of all nodes of contact panels, and their weights in s (k,)."""

@@ -15,8 +15,16 @@ from nldyn.engine.layout import FIRST_POWER, StopRow
 from nldyn.flow.options import FlowOptions
 from nldyn.system.contact_law import duration_factor
 from nldyn.system.friction import Slider
-from nldyn.system.parameters import OF_SLIDERS, OF_SPRINGS, OF_STOPS, Parameter, check_exact
+from nldyn.system.parameters import (
+    OF_ROUND,
+    OF_SLIDERS,
+    OF_SPRINGS,
+    OF_STOPS,
+    Parameter,
+    check_exact,
+)
 from nldyn.system.rigid_stop import AnyStop, RigidStop
+from nldyn.system.round_stop import RoundStop
 from nldyn.system.springs_dampers import Bond
 from nldyn.system.system import System
 
@@ -40,7 +48,7 @@ def stop_row(
             instant=options.instant(0.0),
             restitution=restitution,
         )
-    return StopRow(
+    row = StopRow(
         gap=stop.gap,
         stiffness=stop.stiffness,
         exponent=stop.exponent,
@@ -50,6 +58,26 @@ def stop_row(
         duration=duration_factor(stop.exponent),
         instant=options.instant(0.0 if stop.dashpot else stop.exponent),
         release=-1.0 if stop.pulls else next(releases),
+    )
+    if not isinstance(stop, RoundStop):
+        return row
+    return row._replace(
+        gap=stop.clearance,
+        centre=stop.eccentricity[0],
+        sense=stop.sense,
+        rub=stop.rub,
+        surface=stop.sliding_speed,
+    )
+
+
+def second_row(stop: RoundStop, lead: int, mobility: float, options: FlowOptions) -> StopRow:
+    """Numbers of the second direction of a round clearance as the engine takes them."""
+    return _NO_STOP._replace(
+        mobility=mobility,
+        exponent=stop.exponent,
+        instant=options.instant(stop.exponent),
+        lead=float(lead),
+        centre=stop.eccentricity[1],
     )
 
 
@@ -93,6 +121,12 @@ def parameter_tables(
         name, index = parameter.name, parameter.index
         if name in _COLUMNS:
             table[row] = _COLUMNS[name], index
+        elif name in OF_ROUND:
+            before = len(system.stops) + len(system.sliders) + len(system.bonds)
+            second = before + list(system.round_stops).index(index)
+            column = {"clearance": "gap", "rubbing_friction": "rub"}.get(name, "centre")
+            of = second if name == "second_eccentricity" else index
+            table[row] = StopRow._fields.index(column), of
         elif name in OF_SLIDERS:
             column = {"friction": "friction", "normal_force": "pressing"}[name]
             table[row] = StopRow._fields.index(column), len(system.stops) + index

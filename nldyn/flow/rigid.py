@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.flow.flow_map import FlowMap, Trajectory
 from nldyn.system.friction import Slider
+from nldyn.system.round_stop import RoundStop
 
 SHUT = 1e-13  # of the displacements that add up to that at a stop: a gap counts as closed
 BEHIND = 1e-9  # of them: depth of a state that lies behind a rigid stop
@@ -183,9 +184,14 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
         return forces
     turns = np.exp(1j * phases[:, None] * data.orders)
     rates = (turns @ (np.array([1.0, omega, omega * omega]) @ data.drive)).real
+    modal = flow.to_modal(states)
     for i, stop in system.elastic_stops.items():
-        pushed = stop.force(states @ flow.rows[i] - stop.gap, states @ flow.rate_rows[i])
-        rates -= pushed[:, None] * data.force[:, i]
+        pushed = stop.force(*system.depth_and_speed(stop, modal))
+        if isinstance(stop, RoundStop):
+            along = stop.along(system.round_polar(stop, modal))
+            rates -= pushed[:, None] * along @ data.force[:, flow.round_rows[i]].T
+        else:
+            rates -= pushed[:, None] * data.force[:, i]
     first = len(system.stops)
     slips = np.zeros((len(phases), len(system.sliders)), dtype=bool)
     for i, slider in enumerate(system.sliders, first):

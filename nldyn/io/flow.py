@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, astuple, replace
+from dataclasses import asdict, astuple, fields, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from nldyn.system.linear import LinearPart
 from nldyn.system.loads import BaseMotion, ConstantForce, Excitation, HarmonicForce, Unbalance
 from nldyn.system.parameters import strength
 from nldyn.system.rigid_stop import TRIED_SPEEDS, AnyStop, Restitution, RigidStop
+from nldyn.system.round_stop import RoundStop
 from nldyn.system.spin import Spin
 from nldyn.system.springs_dampers import (
     LARGEST_DEGREE,
@@ -79,7 +80,9 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     _write_interfaces(group, system)
     _write_basis(group, system)
     _write_rigid_stops(group, system)
-    _write_elastic_stops(group, tuple(system.elastic_stops.values()))
+    _write_elastic_stops(group, [stop for stop in system.stops if isinstance(stop, Stop)])
+    if system.round_stops:
+        set_attribute(group, "round_stops", json.dumps(_told_round(system)))
     viscous = [d for d in system.dampers if not isinstance(d, DryFriction)]
     _write_columns(
         group.create_group("dampers"),
@@ -115,6 +118,50 @@ def _told_friction(system: System) -> dict[str, Any]:
             if isinstance(damper, DryFriction) and isinstance(damper.friction, Friction)
         },
     }
+
+
+def _told_round(system: System) -> dict[int, dict[str, Any]]:
+    """The round clearances by their places among all stops."""
+    told = {}
+    for place, stop in system.round_stops.items():
+        numbers = {own.name: getattr(stop, own.name) for own in fields(stop) if own.name != "law"}
+        law = {} if stop.law is None else {"law_trials": _trials(stop)}
+        told[place] = {**numbers, **law}
+    return told
+
+
+def _read_round_stops(group: Group, laws: Laws) -> dict[int, RoundStop]:
+    """What `_told_round` told."""
+    if not group.has_attribute("round_stops"):
+        return {}
+    found = {}
+    try:
+        for key, numbers in json.loads(group.text("round_stops")).items():
+            place, trials = int(key), numbers.pop("law_trials", None)
+            law = laws.get(place) if trials else None
+            if trials and law is None:
+                raise _no_law(group, place, numbers["plane"][0])
+            stop = RoundStop(**numbers, law=law)
+            if trials and [list(each) for each in _trials(stop)] != trials:
+                raise _other_law(group, place, stop.at)
+            found[place] = stop
+    except (ValueError, TypeError, KeyError, AttributeError, IndexError):
+        raise group.fault("attribute", "round_stops", "does not tell round clearances") from None
+    return found
+
+
+def _no_law(group: Group, place: int, at: str) -> SystemModelError:
+    return SystemModelError(
+        f"{group.path}: stop {place} at '{at}' has a law of its own, which a file cannot hold: "
+        f"pass laws={{{place}: law}}"
+    )
+
+
+def _other_law(group: Group, place: int, at: str) -> SystemModelError:
+    return SystemModelError(
+        f"{group.path}: the law passed for stop {place} at '{at}' is not the one with which the "
+        "file was written: its forces differ"
+    )
 
 
 def _with_friction(
@@ -299,7 +346,7 @@ def _write_columns(
         put(group, name, np.array(column, dtype=float), unit)
 
 
-def _trials(stop: Stop) -> list[tuple[float, float, float]]:
+def _trials(stop: Stop | RoundStop) -> list[tuple[float, float, float]]:
     """What a stop's own law gives at a few penetrations and speeds, to know it again."""
     law = stop.law
     if law is None:
@@ -353,9 +400,11 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
 
 def _read_stops(group: Group, laws: Laws) -> tuple[AnyStop, ...]:
     rigid = _read_rigid_stops(group.group("rigid_stops"), laws) if "rigid_stops" in group else {}
-    own = {i: law for i, law in laws.items() if i not in rigid}
-    elastic = _read_elastic_stops(group.group("stops"), own, set(rigid))
-    stops: dict[int, AnyStop] = {**rigid, **elastic}
+    around = _read_round_stops(group, laws)
+    other: dict[int, AnyStop] = {**rigid, **around}
+    own = {i: law for i, law in laws.items() if i not in other}
+    elastic = _read_elastic_stops(group.group("stops"), own, set(other))
+    stops: dict[int, AnyStop] = {**other, **elastic}
     return tuple(stops[i] for i in sorted(stops))
 
 
@@ -377,10 +426,7 @@ def _read_elastic_stops(group: Group, laws: Laws, taken: set[int]) -> dict[int, 
         law: ContactLaw | None = None
         if values["has_own_law"][i]:
             if place not in laws:
-                raise SystemModelError(
-                    f"{group.path}: stop {place} at '{at[i]}' has a law of its own, which a file "
-                    f"cannot hold: pass laws={{{place}: law}}"
-                )
+                raise _no_law(group, place, at[i])
             law = laws[place]
         stop = Stop(
             at[i],
@@ -395,10 +441,7 @@ def _read_elastic_stops(group: Group, laws: Laws, taken: set[int]) -> dict[int, 
             bool(values["pulls"][i]),
         )
         if not np.array_equal(_trials(stop), trials[i]):
-            raise SystemModelError(
-                f"{group.path}: the law passed for stop {place} at '{at[i]}' is not the one with "
-                "which the file was written: its forces differ"
-            )
+            raise _other_law(group, place, at[i])
         stops[place] = stop
     return stops
 

@@ -203,12 +203,13 @@ class _Pieces:
     event: NDArray[np.int64]  # (P,)
     start: Real  # (P + 1, 2n) states z at the begins, and at the end of the last
     depth: Real  # (P, S, m) of a panel, zero in flights and where a stop is open
-    force: Real  # (P, S, m)
+    force: Real  # (P, S, m) normal forces
     kind: NDArray[np.int64]  # (P,)
 
 
 def _pieces(motion: Motion) -> _Pieces:
     records = [stretch.record for stretch in motion.stretches]
+    contacts = [stretch.contacts_at_nodes for stretch in motion.stretches]
     omegas = [stretch.omega for stretch in motion.stretches]
     times = [
         begin + (rec.phase - rec.phase[0]) / omega
@@ -225,8 +226,8 @@ def _pieces(motion: Motion) -> _Pieces:
         np.concatenate(hz),
         np.concatenate([rec.event for rec in records]),
         np.concatenate([*(rec.start for rec in records), last]),
-        np.concatenate([rec.depth for rec in records]),
-        np.concatenate([rec.force for rec in records]),
+        np.concatenate([depth for depth, _ in contacts]),
+        np.concatenate([force for _, force in contacts]),
         np.concatenate([rec.kind for rec in records]),
     )
 
@@ -309,8 +310,7 @@ def _table_of_block(
 
 def _rates(flow: FlowMap, modal: Real, stop: int) -> Real:
     """Rates of penetration (k,) of modal displacements and velocities (k, 2n)."""
-    system = flow.system
-    return np.asarray(modal[:, system.size :] @ system.stop_vector(system.stops[stop]))
+    return flow.system.depth_and_speed(flow.system.stops[stop], modal)[1]
 
 
 def _peaks(values: Real) -> Real:

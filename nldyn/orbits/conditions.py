@@ -384,9 +384,9 @@ def output_slope(place: Place, output: int, phase: float) -> tuple[int, Real, fl
     if not family.in_frequency_alone:
         return _output_slope_by_parameter(place, output, phase)
     flow = orbit.problem.flow
-    row = flow.rows[output]
     carried = float(flow.ride(output, orbit.omega).by_log_omega(np.array(phase)))
     segment, found = _flown_to(orbit, phase, sensitivities=True)
+    row = flow.output_row(output, _state_of(orbit, segment, found))
     if found is None:
         return segment, row, carried
     by_omega = orbit.omega * float(row @ found.d_omega[0])
@@ -397,7 +397,7 @@ def _output_slope_by_parameter(place: Place, output: int, phase: float) -> tuple
     """The same for a parameter other than the frequency, whose part is a difference."""
     at = place.family.at(place.point)
     segment, found = _flown_to(place.orbit, phase, sensitivities=True)
-    row = place.orbit.problem.flow.rows[output]
+    row = place.orbit.problem.flow.output_row(output, _state_of(place.orbit, segment, found))
     row = row if found is None else row @ found.jacobians[0]
     if at.change is not None:
         row = row @ at.change[0]
@@ -418,10 +418,16 @@ def exact_output(orbit: Orbit, output: int, phase: float) -> float:
     it gives, an error of the phase matters to second order only.
     """
     segment, found = _flown_to(orbit, phase, sensitivities=False)
-    state = orbit.problem.nodes(orbit.point)[segment] if found is None else found.ends[0]
+    state = _state_of(orbit, segment, found)
     flow = orbit.problem.flow
     carried = flow.ride(output, orbit.omega).at(np.array(phase))
-    return float(flow.rows[output] @ state + carried)
+    return float(flow.outputs_at(output, state[None])[0] + carried)
+
+
+def _state_of(orbit: Orbit, segment: int, found: Segments | None) -> Real:
+    """State (2n,) where a flow from the start of a segment has come to, if there is one."""
+    start = orbit.problem.nodes(orbit.point)[segment]
+    return np.asarray(start if found is None else found.ends[0])
 
 
 def _flown_to(orbit: Orbit, phase: float, sensitivities: bool) -> tuple[int, Segments | None]:

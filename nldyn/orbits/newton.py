@@ -68,9 +68,7 @@ def check_bounded(flow: FlowMap, omega: float) -> None:
 
 def _touches_only(system: System, motion: Trajectory, omega: float) -> bool:
     """Whether contacts push, but by no more than rounding of the drive and of the motion."""
-    stops = len(system.stops)
-    force = float(motion.record.force[:, :stops].max(initial=0.0))
-    depth = float(motion.record.depth[:, :stops].max(initial=0.0))
+    depth, force = (float(each.max(initial=0.0)) for each in motion.contacts_at_nodes)
     drive = sum(
         abs(source.phasor) * (source.harmonic * omega) ** source.power
         for source in system.excitation

@@ -34,7 +34,7 @@ from nldyn.orbits.multipliers import (
     uncertainties,
 )
 from nldyn.orbits.shooting import ShootingProblem
-from nldyn.system.rigid_stop import AnyStop
+from nldyn.system.round_stop import RoundStop
 from nldyn.system.system import System
 
 SAME_PHASE = 1e-9  # in rad: an extreme and an impact
@@ -439,9 +439,7 @@ class Orbit:
     def _penetrations(self) -> dict[int, float]:
         """Deepest penetration of each stop that is not rigid."""
         return {
-            index: self._highest(
-                index, lambda found: np.where(found.is_maximum, found.values, 0.0)
-            )
+            index: self._highest(index, lambda found: np.where(found.is_maximum, found.values, 0.0))
             for index in self.system.elastic_stops
         }
 
@@ -519,10 +517,10 @@ class Orbit:
 
         def force(where: float) -> float:
             state = self.states(np.array([where]))
-            return stop.force(*_depth_and_speed(self.system, stop, state)).item()
+            return stop.force(*self.system.depth_and_speed(stop, state)).item()
 
-        pieces = self.trajectory.record
-        within = (pieces.kind >= 0) & (pieces.force[:, index].max(axis=1) > 0.0)
+        pieces, force_at_nodes = self.trajectory.record, self.trajectory.contacts_at_nodes[1]
+        within = (pieces.kind >= 0) & (force_at_nodes[:, index].max(axis=1) > 0.0)
         reach = self.omega * float(pieces.duration[within].max(initial=0.0))
         found = minimize_scalar(
             lambda where: -force(where),
@@ -553,7 +551,7 @@ class Orbit:
         """Penetration of a stop (m, negative when open) at any forcing phases."""
         check_whole("penetration: stop", stop, 0, len(self.system.stops) - 1)
         states = self.states(phases)
-        return _depth_and_speed(self.system, self.system.stops[stop], states)[0]
+        return self.system.depth_and_speed(self.system.stops[stop], states)[0]
 
     def history(self, samples: int = 1000) -> History:
         """Sample one period of the orbit.
@@ -599,7 +597,7 @@ def history_of(
     depth = np.empty((len(system.stops), time.size))
     force = rest.T.copy()
     for row, stop in enumerate(system.stops):
-        depth[row], speed = _depth_and_speed(system, stop, states)
+        depth[row], speed = system.depth_and_speed(stop, states)
         if row in system.elastic_stops:
             force[row] = system.elastic_stops[row].force(depth[row], speed)
     return History(
@@ -641,8 +639,15 @@ def contact_damping(flow: FlowMap, motion: Trajectory) -> float:
     states = flow.to_modal(motion.states(phases))
     total = contraction
     for stop in system.elastic_stops.values():
+        viscosity = stop.viscosity(*system.depth_and_speed(stop, states))
+        if isinstance(stop, RoundStop):
+            at, rows = system.round_polar(stop, states), np.array(system.stop_vectors(stop))
+            moved = stop.sense * at.normal @ rows
+            viscosity = viscosity * (moved * (stop.along(at) @ rows)).sum(axis=1)
+            total += float(weights @ viscosity)
+            continue
         v = system.stop_vector(stop)
-        total += float(v @ v * weights @ stop.viscosity(*_depth_and_speed(system, stop, states)))
+        total += float(v @ v * weights @ viscosity)
     for bond in system.bonds:
         v = system.vector_between(bond.at, bond.against)
         q, rates = states[:, : system.size], states[:, system.size :]
@@ -659,12 +664,6 @@ def impact_contraction(motion: Trajectory) -> float:
         factor = motion.flow.system.rigid_stops[index].determinant(speed)
         total += -math.log(factor) if factor > 0.0 else math.inf
     return total
-
-
-def _depth_and_speed(system: System, stop: AnyStop, states: Real) -> tuple[Real, Real]:
-    """Penetration of a stop (negative when open) and its rate at modal states (k, 2n)."""
-    v = system.stop_vector(stop)
-    return states[:, : system.size] @ v - stop.gap, states[:, system.size :] @ v
 
 
 def check_observe(system: System, observe: str | None, called: str = "observe") -> str:

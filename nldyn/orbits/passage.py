@@ -82,7 +82,8 @@ def opened(flow: FlowMap, left_out: Collection[int], size: float) -> FlowMap:
     stops = list(flow.system.stops)
     for stop in left_out:
         reach = size * max(float(np.linalg.norm(flow.rows[stop])), 1.0)
-        stops[stop] = replace(stops[stop], gap=OUT_OF_REACH * (stops[stop].gap + reach))
+        left = flow.system.rigid_stops[stop]
+        stops[stop] = replace(left, gap=OUT_OF_REACH * (left.gap + reach))
     return FlowMap(flow.system.with_elements(stops=tuple(stops)), flow.options)
 
 

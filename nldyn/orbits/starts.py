@@ -31,6 +31,7 @@ from nldyn.orbits.shooting import (
 )
 from nldyn.runtime.progress import Progress, Shares, shows_progress, silent
 from nldyn.system.equilibrium import at_rest, rest
+from nldyn.system.round_stop import RoundStop
 from nldyn.system.system import System
 
 DECAYS = 4.0  # time allowed for settling, over the slowest decay time of the linear part
@@ -175,9 +176,11 @@ def reach(system: System) -> float:
     0.001
     """
     needed = [
-        max(stop.gap, 0.0) / float(np.linalg.norm(row))
+        max(stop.room if isinstance(stop, RoundStop) else stop.gap, 0.0)
+        / float(np.linalg.norm(row))
         for stop in system.stops
-        if np.any(row := system.displacement_row(system.stop_vector(stop)))
+        for c in system.stop_vectors(stop)
+        if np.any(row := system.displacement_row(c))
     ]
     return min(needed, default=0.0)
 

@@ -36,6 +36,7 @@ from nldyn.plot.words import (
 from nldyn.runtime.progress import in_notebook
 from nldyn.system.chart import THE_FREQUENCY, parameter_name
 from nldyn.system.naming import stop_name
+from nldyn.system.round_stop import RoundStop
 
 if TYPE_CHECKING:
     from nldyn.bifurcations.point import SpecialPoint
@@ -394,7 +395,8 @@ def stop_places(system: System, interface: str) -> list[float]:
     >>> stop_places(System.from_modal([13.1], {"m": [0.635]}, stops=stops), "m")
     [-0.002, 0.002]
     """
-    ours = [stop for stop in system.stops if stop.at == interface and stop.against is None]
+    flat = [stop for stop in system.stops if not isinstance(stop, RoundStop)]
+    ours = [stop for stop in flat if stop.at == interface and stop.against is None]
     return sorted({stop.direction * stop.gap for stop in ours})
 
 

@@ -155,7 +155,8 @@ class Cloud:
         mean, covariance = states.mean(axis=0), np.cov(states.T / size, bias=True)
         added = NARROWEST**2 * np.diag(covariance) + LEAST**2
         axes = np.asarray(np.linalg.cholesky(covariance + np.diag(added)), dtype=float)
-        rows = flow.rows[: len(flow.system.stops)]
+        around = [flow.rows[rows] for rows in flow.round_rows.values()]  # on all sides
+        rows = np.vstack([flow.rows[: len(flow.system.stops)], *around, *(-r for r in around)])
         beyond = rows @ mean + size * np.linalg.norm(rows @ axes, axis=1)
         return cls(mean, size * axes, rows, np.maximum((states @ rows.T).max(axis=0), beyond))
 

@@ -20,6 +20,7 @@ from nldyn.base.errors import (
 from nldyn.system.friction import DryFriction
 from nldyn.system.naming import turned
 from nldyn.system.parameters import (
+    OF_ROUND,
     OF_SLIDERS,
     OF_SPRINGS,
     OF_STOPS,
@@ -40,7 +41,10 @@ _OF_STOPS = OF_STOPS
 _OF_DAMPERS = ("coefficient",)
 _OF_SPRINGS = {"spring_stiffness": "stiffness"}  # and what it is called there
 _OF_MODES = ("modal_damping", "natural_frequency_hz")
-OF_ELEMENTS = (*_OF_STOPS, *SOURCES, *OF_SLIDERS, *_OF_DAMPERS, *_OF_SPRINGS, *OF_SPRINGS)
+OF_ELEMENTS = (
+    *(*_OF_STOPS, *OF_ROUND, *SOURCES, *OF_SLIDERS),
+    *(*_OF_DAMPERS, *_OF_SPRINGS, *OF_SPRINGS),
+)
 UNITS = {
     "frequency_hz": "Hz",
     SPIN: "Hz",
@@ -51,6 +55,10 @@ UNITS = {
     "dissipation": "s/m",
     "dashpot": "N s/m",
     "restitution": "1",
+    "clearance": "m",
+    "rubbing_friction": "1",
+    "first_eccentricity": "m",
+    "second_eccentricity": "m",
     "amplitude": "N",
     "mass_times_radius": "kg m",
     "force": "N",
@@ -65,7 +73,7 @@ BOUNDS = {
     name: (0.0, math.inf)
     for name in (
         *("stiffness", "dissipation", "dashpot", *SOURCES, *OF_SLIDERS),
-        *(*_OF_DAMPERS, *_OF_MODES),
+        *("clearance", "rubbing_friction", *_OF_DAMPERS, *_OF_MODES),
     )
     if name != "force"  # has either sign
 } | {  # between which there are systems
@@ -73,6 +81,7 @@ BOUNDS = {
     "restitution": (0.0, 1.0),
 }
 POSITIVE = (
+    "clearance",
     "stiffness",
     "normal_force",
     "natural_frequency_hz",
@@ -294,6 +303,8 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
         return float(_polynomial(system, index).coefficients[int(name[1:]) - 1])
     if name == "friction":
         return system.sliders[index].friction.coefficient
+    if name in OF_ROUND:
+        return system.round_stops[index].number(name)
     return float(getattr(elements_of(system, name)[index], _OF_SPRINGS.get(name, name)))
 
 
@@ -330,6 +341,10 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
         return system.with_spin(value)
     if name in _OF_STOPS:
         return system.with_elements(stops=_replaced(system.stops, index, name, value))
+    if name in OF_ROUND:
+        other = system.round_stops[index].with_number(name, value)
+        stops = (*system.stops[:index], other, *system.stops[index + 1 :])
+        return system.with_elements(stops=stops)
     if name in OF_SPRINGS:
         values = list(_polynomial(system, index).coefficients)
         values[int(name[1:]) - 1] = value

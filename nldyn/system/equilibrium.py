@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -9,13 +10,15 @@ import numpy as np
 from nldyn.base.arrays import SLACK, TINY, Complex, Real
 from nldyn.base.errors import SystemModelError
 from nldyn.system.contact_law import power_law
-from nldyn.system.rigid_stop import RigidStop
+from nldyn.system.rigid_stop import AnyStop, RigidStop
+from nldyn.system.round_stop import Polar, RoundStop
 from nldyn.system.springs_dampers import Bond
 from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
 MOST_STEPS = 200
 SHORTEST = 1e-14  # last step, relative
+SHORT = 1e-13  # the same of Newton's method where nothing has a potential
 FLAT = 1e-12  # of the stops' largest stiffness, below which a rigid motion counts as not held
 NOT_HELD = 1e-9  # share of a force, or of a direction, that counts as none
 RIGID = 1e8  # stiffness of what stands in for a rigid stop, beside the structure's
@@ -66,7 +69,7 @@ def rest(system: System) -> Real:
             f"the structure rests farther away than {FARTHEST:g} m √kg: is a constant force or "
             "the gap of the stop that holds it in the right unit?"
         )
-    return q
+    return _with_friction(system, q)
 
 
 def rest_positions(system: System) -> list[Real]:
@@ -112,7 +115,8 @@ def rest_positions(system: System) -> list[Real]:
         raise SystemModelError(
             f"{_what_runs_away(system)}, so that the structure has no rest position"
         )
-    return sorted(found, key=lambda q: potential_at(system, push, q))
+    found.sort(key=lambda q: potential_at(system, push, q))
+    return [_with_friction(system, q) for q in found]
 
 
 def _what_runs_away(system: System) -> str:
@@ -216,7 +220,7 @@ def with_springs_for_rigid_stops(system: System) -> System:
     if not system.rigid_stops:
         return system
     push = float(np.linalg.norm(constant_force(system)))
-    stops: list[Stop] = []
+    stops: list[AnyStop] = []
     for stop in system.stops:
         if isinstance(stop, RigidStop):
             c = float(np.linalg.norm(system.stop_vector(stop)))
@@ -261,6 +265,8 @@ def _downhill(system: System, q: Real, slope: Real) -> Real:
     for stop in system.elastic_stops.values():
         c = system.stop_vector(stop)
         pace, left = float(c @ free) / force, stop.gap - float(c @ q)
+        if isinstance(stop, RoundStop):
+            pace, left = _way_round(system, stop, q, free / force)
         if pace > NOT_HELD * np.linalg.norm(c) and left >= 0.0:
             depth = (force / (stop.stiffness * pace)) ** (1.0 / stop.exponent)
             ways.append((left + depth) / pace)
@@ -272,6 +278,24 @@ def _downhill(system: System, q: Real, slope: Real) -> Real:
         "excitation by a constant force acts on a body that neither a spring nor a stop holds "
         "against it; hold it, or turn the force or the stop round"
     )
+
+
+def _way_round(system: System, stop: RoundStop, q: Real, way: Real) -> tuple[float, float]:
+    """How fast it closes, where a way from q first meets a round clearance, and what is left of it.
+
+    The pace is that of the penetration there, along the way, and zero if it never does.
+    """
+    at, rows = _at_round(system, stop, q)
+    place, along = at.radius[0] * at.normal[0], rows @ way
+    square = float(along @ along)
+    a, b = float(place @ along), float(place @ place) - stop.clearance**2
+    root = a * a - square * b
+    if square == 0.0 or root < 0.0:
+        return 0.0, 0.0
+    step = (-a + stop.sense * math.sqrt(root)) / square
+    there = place + step * along
+    pace = stop.sense * float(there @ along) / stop.clearance
+    return pace, step * pace
 
 
 def _newton_step(system: System, stiffness: Real, slope: Real) -> Real:
@@ -321,7 +345,12 @@ def tangent_stiffness(system: System, q: Real) -> Real:
     """Stiffness (n, n) of the structure with its closed stops at modal displacements q."""
     matrix = np.array(system.stiffness)
     for _, stop, c, depth in _closed(system.elastic_stops, system, q):
-        matrix += _elastic(stop, depth)[1] * np.outer(c, c)
+        force, stiffness = _elastic(stop, depth)
+        matrix += stiffness * np.outer(c, c)
+        if isinstance(stop, RoundStop):
+            at, rows = _at_round(system, stop, q)
+            across = at.across[0] @ rows
+            matrix += stop.sense * force / float(at.radius[0]) * np.outer(across, across)
     for bond in system.bonds:
         c = _vector(system, bond)
         matrix += float(bond.stiffness(c @ q)) * np.outer(c, c)
@@ -334,17 +363,68 @@ def _vector(system: System, bond: Bond) -> Real:
 
 
 def _closed(
-    stops: Mapping[int, Stop], system: System, q: Real
-) -> Iterator[tuple[int, Stop, Real, float]]:
+    stops: Mapping[int, Stop | RoundStop], system: System, q: Real
+) -> Iterator[tuple[int, Stop | RoundStop, Real, float]]:
     """Those of some stops that are closed at modal displacements q: vectors and penetrations."""
     for i, stop in stops.items():
-        c = system.stop_vector(stop)
-        depth = float(c @ q) - stop.gap
+        if isinstance(stop, RoundStop):
+            at, rows = _at_round(system, stop, q)
+            c, depth = stop.sense * at.normal[0] @ rows, float(at.depth[0])
+        else:
+            c = system.stop_vector(stop)
+            depth = float(c @ q) - stop.gap
         if depth > 0.0:
             yield i, stop, c, depth
 
 
-def _elastic(stop: Stop, depth: float) -> tuple[float, float]:
+def _at_round(system: System, stop: RoundStop, q: Real) -> tuple[Polar, Real]:
+    """Where a structure at q is in a round clearance, and the vectors (2, n) of its directions."""
+    return system.round_polar(stop, at_rest(q)[None]), np.array(system.stop_vectors(stop))
+
+
+def _rubbed(system: System, q: Real) -> tuple[Real, Real]:
+    """Friction (n,) of the closed round clearances at rest, and its derivative (n, n)."""
+    force, slope = np.zeros(system.size), np.zeros((system.size, system.size))
+    for _, stop, c, depth in _closed(system.elastic_stops, system, q):
+        if not isinstance(stop, RoundStop) or not stop.friction:
+            continue
+        at, rows = _at_round(system, stop, q)
+        normal, across = at.normal[0] @ rows, at.across[0] @ rows
+        pressed, stiffness = _elastic(stop, depth)
+        force += stop.rub * pressed * across
+        turned = -stop.rub * pressed / float(at.radius[0]) * normal
+        slope += stop.rub * stiffness * np.outer(across, c) + np.outer(turned, across)
+    return force, slope
+
+
+def _with_friction(system: System, q: Real) -> Real:
+    """Where it rests with the friction of round clearances, from where it would without.
+
+    Raises
+    ------
+    SystemModelError
+        If it does not: friction carries it round.
+    """
+    push = constant_force(system)
+    rubs = any(stop.friction for stop in system.round_stops.values())
+    for _ in range(MOST_STEPS if rubs else 0):
+        force, slope = _rubbed(system, q)
+        if not np.any(force):
+            return q
+        wrong = force_at(system, push, q) + force
+        step = np.linalg.lstsq(tangent_stiffness(system, q) + slope, -wrong, rcond=None)[0]
+        q = q + step
+        if np.linalg.norm(step) <= SHORT * np.linalg.norm(q):
+            return q
+    if rubs:
+        raise SystemModelError(
+            "under constant forces and the friction of a round clearance it comes to no rest that "
+            "Newton's method finds"
+        )
+    return q
+
+
+def _elastic(stop: Stop | RoundStop, depth: float) -> tuple[float, float]:
     """Force and stiffness of a closed stop at rest."""
     force, stiffness, _ = power_law(stop.stiffness, stop.exponent, 0.0, 0.0, depth, 0.0)
     return force, stiffness

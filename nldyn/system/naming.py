@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
+
+from nldyn.system.round_stop import RoundStop
 
 if TYPE_CHECKING:
     from nldyn.system.system import System
@@ -51,6 +54,8 @@ def stop_name(system: System, index: int) -> str:
     "stop at 'tip', direction -1"
     """
     stops, stop = system.stops, system.stops[index]
+    if isinstance(stop, RoundStop):
+        return _round_name(system, stop)
     name = f"stop at '{stop.at}'" + (f" against '{stop.against}'" if stop.against else "")
     alike = [other for other in stops if (other.at, other.against) == (stop.at, stop.against)]
     if any(other.direction != stop.direction for other in alike):
@@ -58,3 +63,22 @@ def stop_name(system: System, index: int) -> str:
     if any(other.direction == stop.direction and other.gap != stop.gap for other in alike):
         name += f", gap {stop.gap:g} {system.unit(stop.at)}"
     return name
+
+
+def _round_name(system: System, stop: RoundStop) -> str:
+    """Name a round clearance by its plane and, where several share it, by its size."""
+    name = f"{'ring' if stop.inside else 'pin'} at {quoted(stop.plane)}"
+    name += f" against {quoted(stop.against_plane)}" if stop.against_plane else ""
+    alike = [other for other in system.round_stops.values() if other.ends == stop.ends]
+    return name if len(alike) == 1 else f"{name}, clearance {stop.clearance:g} m"
+
+
+def quoted(names: Sequence[str]) -> str:
+    """Some names in a sentence.
+
+    Examples
+    --------
+    >>> quoted(["x", "y"])
+    "'x', 'y'"
+    """
+    return ", ".join(f"'{name}'" for name in names)

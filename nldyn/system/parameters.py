@@ -6,10 +6,14 @@ from dataclasses import dataclass
 
 from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.system.loads import Excitation
+from nldyn.system.round_stop import RoundStop
 from nldyn.system.springs_dampers import LARGEST_DEGREE, PolynomialSpring
 from nldyn.system.system import System
 
 OF_STOPS = ("gap", "stiffness", "exponent", "dissipation", "dashpot", "restitution")
+# of round clearances, and the numbers of stops that they have, too
+OF_ROUND = ("clearance", "rubbing_friction", "first_eccentricity", "second_eccentricity")
+SHARED = ("stiffness", "exponent", "dissipation")
 OF_SPRINGS = tuple(f"k{power}" for power in range(1, LARGEST_DEGREE + 1))
 OF_SLIDERS = {"friction": "coefficient", "normal_force": "normal_force"}  # and what it is there
 SOURCES = ("amplitude", "mass_times_radius", "force")
@@ -36,9 +40,10 @@ class Parameter:
     ----------
     name : str
         gap, stiffness, exponent, dissipation, dashpot or restitution of a stop (not of one with a
-        law of its own, but for the gap), amplitude, mass_times_radius or force of an excitation;
-        k1, k2, ..., the coefficients of a polynomial spring; friction (the coefficient) and
-        normal_force of a slider.
+        law of its own, but for the gap); clearance, rubbing_friction (the coefficient),
+        first_eccentricity or second_eccentricity of a round clearance; amplitude,
+        mass_times_radius or force of an excitation; k1, k2, ..., the coefficients of a polynomial
+        spring; friction (the coefficient) and normal_force of a slider.
     index : int
         Which of the stops, excitations, springs, sliders (`System.sliders`), dampers or modes of
         the system.
@@ -82,12 +87,21 @@ def check_exact(system: System, parameter: Parameter) -> None:
     if name in OF_STOPS:
         check_index(parameter, "stop", len(system.stops))
         stop = system.stops[index]
-        if not hasattr(stop, name):
-            kind = "rigid" if stop.impulsive else "elastic"
+        around = isinstance(stop, RoundStop)
+        if not hasattr(stop, name) or (around and name not in SHARED):
+            kind = "rigid" if stop.impulsive else "a round clearance" if around else "elastic"
             raise SystemModelError(f"parameter '{name}': stops[{index}] is {kind}, without {name}")
         if name != "gap" and stop.law is not None:
             raise SystemModelError(
                 f"parameter '{name}': stops[{index}] has a law of its own, which knows no {name}"
+            )
+    elif name in OF_ROUND:
+        check_index(parameter, "stop", len(system.stops))
+        if index not in system.round_stops:
+            raise SystemModelError(f"parameter '{name}': stops[{index}] is no round clearance")
+        if name == "rubbing_friction" and not system.round_stops[index].surface_speed:
+            raise SystemModelError(
+                f"parameter '{name}': stops[{index}] has no surface_speed, in whose sense it slides"
             )
     elif name in SOURCES:
         check_index(parameter, "excitation", len(system.excitation))
@@ -109,7 +123,7 @@ def check_exact(system: System, parameter: Parameter) -> None:
                 f"parameter '{name}': a stop presses slider {index} on, no constant force"
             )
     else:
-        known = ", ".join([*OF_STOPS, *SOURCES, *OF_SPRINGS, *OF_SLIDERS])
+        known = ", ".join([*OF_STOPS, *OF_ROUND, *SOURCES, *OF_SPRINGS, *OF_SLIDERS])
         raise SystemModelError(f"unknown parameter '{name}'; there are: {known}")
 
 

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.system.contact_law import ContactLaw, numba_for
+from nldyn.system.round_stop import RoundStop
 from nldyn.system.stop import Stop
 from nldyn.system.values import check_sides
 
@@ -120,7 +121,7 @@ class RigidStop:
         return float(self.restitution(speed)[0]) if callable(self.restitution) else self.restitution
 
 
-AnyStop = Stop | RigidStop
+AnyStop = Stop | RigidStop | RoundStop
 
 
 def _check_restitution(owner: str, restitution: Restitution, speed: float) -> None:

@@ -28,6 +28,7 @@ from nldyn.system.linear import (
 from nldyn.system.loads import BaseMotion, Excitation, HarmonicForce
 from nldyn.system.ride import NO_RIDE, Ride, carried_apart, told_apart
 from nldyn.system.rigid_stop import AnyStop, RigidStop
+from nldyn.system.round_stop import Polar, RoundStop
 from nldyn.system.spin import Spin, same_spin, skew
 from nldyn.system.springs_dampers import (
     Bond,
@@ -452,9 +453,10 @@ class System:
     def output(self, interface: str) -> int:
         """Number of the displacement of an interface among the outputs of a flow map.
 
-        Before it come the penetrations of the stops and the displacements of sliders and bonds.
+        Before it come the penetrations of the stops, the displacements of sliders and bonds, and
+        those along the second directions of round clearances.
         """
-        acting = len(self.stops) + len(self.sliders) + len(self.bonds)
+        acting = len(self.stops) + len(self.sliders) + len(self.bonds) + len(self.round_stops)
         return acting + self.interfaces.index(interface)
 
     @property
@@ -468,19 +470,25 @@ class System:
     def left_free(self) -> bool:
         """Whether the stops, too, leave a rigid-body motion free."""
         free = self.natural_frequencies == 0.0
-        held = [self.vector_between(each.at, each.against)[free] for each in self._holders]
+        held = [self.vector_between(*ends)[free] for ends in self._held_ends]
         return _rank(held, int(free.sum())) < int(free.sum())
 
     @property
-    def _holders(self) -> tuple[AnyStop | AnySpring, ...]:
-        return (*self.stops, *self.springs)
+    def _held_ends(self) -> Iterator[tuple[str, str | None]]:
+        """What stops and springs hold."""
+        for each in (*self.stops, *self.springs):
+            if isinstance(each, RoundStop):
+                yield from each.ends
+            else:
+                yield each.at, each.against
 
     @cached_property
     def conservative(self) -> bool:
         """Whether nothing takes energy out: no damping, and no stop whose force knows the speed."""
         damped = np.any(self.total_damping + self.total_damping.T)
         damped = damped or np.any(_or_zero(self.circulatory))
-        return not damped and not self.loses_by_speed
+        rubs = any(stop.friction for stop in self.round_stops.values())
+        return not (damped or rubs or self.loses_by_speed)
 
     @property
     def jumps(self) -> bool:
@@ -494,11 +502,14 @@ class System:
         All excitation must change its sign after half its period T: it has odd harmonics only.
         """
         stops = [
-            (self.stop_vector(s), replace(s, at="", direction=1, against=None)) for s in self.stops
+            (self.stop_vector(s), replace(s, at="", direction=1, against=None))
+            for s in self.stops
+            if not isinstance(s, RoundStop)
         ]
         odd = not np.any(self.drive[self.orders % 2 == 0.0])
         return (
             odd
+            and all(stop.concentric for stop in self.round_stops.values())
             and all(bond.odd for bond in self.bonds)
             and all(slider.friction.base_speed == 0.0 for slider in self.sliders)
             and all(
@@ -509,9 +520,14 @@ class System:
         )
 
     @cached_property
-    def elastic_stops(self) -> dict[int, Stop]:
+    def elastic_stops(self) -> dict[int, Stop | RoundStop]:
         """The stops that give way, by their places among all."""
-        return {i: stop for i, stop in enumerate(self.stops) if isinstance(stop, Stop)}
+        return {i: s for i, s in enumerate(self.stops) if isinstance(s, Stop | RoundStop)}
+
+    @cached_property
+    def round_stops(self) -> dict[int, RoundStop]:
+        """The round clearances, by their places among all stops."""
+        return {i: stop for i, stop in enumerate(self.stops) if isinstance(stop, RoundStop)}
 
     @cached_property
     def rigid_stops(self) -> dict[int, RigidStop]:
@@ -529,11 +545,11 @@ class System:
             cross = None if cross is None else modes.T @ cross @ modes
         squares = np.zeros(self.size)
         for stop in self.elastic_stops.values():
-            if stop.exponent == 1.0 or stop.gap < 0.0:
-                preload = max(-stop.gap, 0.0) ** (stop.exponent - 1.0)
-                slope = stop.exponent * stop.stiffness * preload
-                c = self.stop_vector(stop)
-                squares += slope * (c if modes is None else modes.T @ c) ** 2
+            deep = 0.0 if isinstance(stop, RoundStop) else max(-stop.gap, 0.0)
+            if stop.exponent == 1.0 or deep > 0.0:
+                slope = stop.exponent * stop.stiffness * deep ** (stop.exponent - 1.0)
+                for c in self.stop_vectors(stop):
+                    squares += slope * (c if modes is None else modes.T @ c) ** 2
         for bond in self.bonds:
             c = self.vector_between(bond.at, bond.against)
             slope = abs(bond.coefficients[0]) if bond.coefficients else 0.0
@@ -547,8 +563,30 @@ class System:
         return c if against is None else c - self.participation[against]
 
     def stop_vector(self, stop: AnyStop) -> Real:
-        """Modal vector c with penetration ``c @ q - gap``, shape (n,)."""
+        """Modal vector c with penetration ``c @ q - gap``, shape (n,).
+
+        Of a round clearance that of its first direction.
+        """
         return stop.direction * self.vector_between(stop.at, stop.against)
+
+    def stop_vectors(self, stop: AnyStop) -> list[Real]:
+        """Modal vectors (n,) along which a stop acts: one, of a round clearance two."""
+        if isinstance(stop, RoundStop):
+            return [self.vector_between(*ends) for ends in stop.ends]
+        return [self.stop_vector(stop)]
+
+    def round_polar(self, stop: RoundStop, states: Real) -> Polar:
+        """Where a body is in a round clearance, at modal states (k, 2n)."""
+        rows = np.array(self.stop_vectors(stop)).T
+        return stop.polar(states[:, : self.size] @ rows, states[:, self.size :] @ rows)
+
+    def depth_and_speed(self, stop: AnyStop, states: Real) -> tuple[Real, Real]:
+        """Penetration of a stop (negative when open) and its rate at modal states (k, 2n)."""
+        if isinstance(stop, RoundStop):
+            at = self.round_polar(stop, states)
+            return at.depth, at.rate
+        v = self.stop_vector(stop)
+        return states[:, : self.size] @ v - stop.gap, states[:, self.size :] @ v
 
     def load_vector(self, name: str) -> Real:
         """Modal force (n,) of a unit load at an interface, or on a load vector."""
@@ -773,14 +811,16 @@ class System:
         loads = {base.at for base in bases}
         for table in ("stops", "sliders", "springs", "dampers"):
             for number, element in enumerate(getattr(self, table)):
-                if element.against is None:
-                    continue
-                some, other = (
-                    {at: float(self.loads[at] @ self.participation[end]) for at in loads}
-                    for end in (element.at, element.against)
-                )
-                if carried_apart(bases, some, other):
-                    raise SystemModelError(told_apart(table, number, element.at, element.against))
+                ends = getattr(element, "ends", [(element.at, element.against)])
+                for at, against in ends:
+                    if against is None:
+                        continue
+                    some, other = (
+                        {load: float(self.loads[load] @ self.participation[end]) for load in loads}
+                        for end in (at, against)
+                    )
+                    if carried_apart(bases, some, other):
+                        raise SystemModelError(told_apart(table, number, at, against))
 
     def with_slider(self, number: int, name: str, value: float) -> System:
         """The system with another `coefficient` or `normal_force` of one of its `sliders`."""
@@ -788,7 +828,9 @@ class System:
         friction = slider.friction.with_coefficient(value) if name == "coefficient" else None
         if slider.stop >= 0:
             stops = list(self.stops)
-            stops[slider.stop] = replace(self.elastic_stops[slider.stop], friction=friction)
+            pressing = stops[slider.stop]
+            assert isinstance(pressing, Stop)
+            stops[slider.stop] = replace(pressing, friction=friction)
             return self.with_elements(stops=tuple(stops))
         dry = [i for i, damper in enumerate(self.dampers) if isinstance(damper, DryFriction)]
         place = dry[number - len(self.sliders)]  # they are the last of the sliders
@@ -859,10 +901,7 @@ class System:
             for element in elements:
                 if not isinstance(element, classes):
                     raise SystemModelError(f"{kind} cannot be {shown(element)}")
-                for end in ("at", "against", "tangent", "tangent_against"):
-                    name = getattr(element, end, None)
-                    if name is None:
-                        continue
+                for end, name in _ends_of(element):
                     if kind == "excitation" and name in self.loads:
                         continue
                     if isinstance(element, BaseMotion):
@@ -879,6 +918,18 @@ class System:
                             f"{kind} {end} unknown interface '{name}'; there are: {known}"
                             + _told_of_loads(kind, self.loads)
                         )
+
+
+def _ends_of(element: Any) -> Iterator[tuple[str, str]]:
+    """What the ends of an element are called, and the interfaces there."""
+    for end in ("at", "against", "tangent", "tangent_against"):
+        name = getattr(element, end, None)
+        if name is not None:
+            yield end, name
+    if isinstance(element, RoundStop):
+        yield "at", element.plane[1]
+        if element.against_plane is not None:
+            yield "against", element.against_plane[1]
 
 
 def _check_modal_vector(name: str, phi: Real, modes: int) -> None:

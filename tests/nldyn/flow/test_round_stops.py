@@ -1,0 +1,371 @@
+"""Round clearances: circular whirl in closed form, polygons, integration from event to event."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import scipy.linalg as sla
+from scipy.optimize import brentq
+
+from nldyn import (
+    ConstantForce,
+    FlowMap,
+    HarmonicForce,
+    Parameter,
+    RoundStop,
+    Stop,
+    System,
+    SystemModelError,
+    Unbalance,
+    continue_branch,
+    load,
+    save,
+    solve_orbit,
+)
+from nldyn.system.chart import value_of, with_value
+from nldyn.system.equilibrium import rest
+from tests.rubbing import Ring, Rotor
+
+MASS, STIFFNESS, DAMPING, CLEARANCE = 2.0, 8e3, 6.0, 1e-3
+PLANE = {"x": [1.0, 0.0], "y": [0.0, 1.0]}
+PERIOD = np.array([0.0, 2.0 * np.pi])
+
+
+def jeffcott(stops, unbalance=2e-3, *more):
+    """A disc on a light shaft, of which the modes are x and y over the square root of its mass."""
+    return System.from_matrices(
+        MASS * np.eye(2), STIFFNESS * np.eye(2), PLANE, damping=DAMPING * np.eye(2), stops=stops,
+        excitation=[Unbalance("x", unbalance), Unbalance("y", unbalance, phase_deg=-90.0), *more],
+    )  # fmt: skip
+
+
+class Whirl:
+    """The circular whirl of a disc that rubs all around, and small motions about it."""
+
+    def __init__(self, stop: RoundStop, unbalance: float, hz: float):
+        self.stop, self.w = stop, 2.0 * math.pi * hz
+        inertia = STIFFNESS - MASS * self.w**2
+        drive = unbalance * self.w**2
+
+        def force(r: float) -> float:
+            return stop.stiffness * (r - stop.clearance) ** stop.exponent
+
+        def reaction(r: float) -> complex:
+            return complex(1.0, stop.rub) * force(r)
+
+        self.r = brentq(
+            lambda r: abs((inertia + 1j * DAMPING * self.w) * r + reaction(r)) - drive,
+            stop.clearance * (1.0 + 1e-9), 1.0, xtol=1e-18, rtol=1e-15,
+        )  # fmt: skip
+        turned = drive / (inertia + 1j * DAMPING * self.w + reaction(self.r) / self.r)
+        rate = 1j * self.w * turned
+        self.state = math.sqrt(MASS) * np.array([turned.real, turned.imag, rate.real, rate.imag])
+        self.force = force(self.r)
+        slope = stop.exponent * self.force / (self.r - stop.clearance)
+        self.matrix = self._matrix(inertia, slope, stop.dissipation * self.force)
+
+    def _matrix(self, inertia: float, slope: float, viscosity: float):
+        """In the frame that turns with it, along the radius and across."""
+        rub, secant, w = self.stop.rub, self.force / self.r, self.w
+        contact = np.array([[slope, -rub * secant], [rub * slope, secant]])
+        loss = np.array([[viscosity, 0.0], [rub * viscosity, 0.0]])
+        turn = np.array([[0.0, -1.0], [1.0, 0.0]])
+        found = np.zeros((4, 4))
+        found[:2, 2:] = np.eye(2)
+        found[2:, :2] = -(inertia * np.eye(2) + DAMPING * w * turn + contact) / MASS
+        found[2:, 2:] = -(DAMPING * np.eye(2) + loss + 2.0 * MASS * w * turn) / MASS
+        return found
+
+    @property
+    def multipliers(self):
+        return np.exp(np.linalg.eigvals(self.matrix) * 2.0 * np.pi / self.w)
+
+
+@pytest.mark.parametrize(
+    "stop",
+    [
+        RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0),
+        RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=0.05, surface_speed=5.0),
+        RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=0.05, surface_speed=-5.0),
+        RoundStop(("x", "y"), 2e6, CLEARANCE, friction=0.05, surface_speed=5.0),
+        RoundStop(
+            ("x", "y"), 5e4, CLEARANCE, 1.0, dissipation=2.0, friction=0.1, surface_speed=5.0
+        ),
+    ],
+)
+def test_full_annular_rub_is_that_in_closed_form(stop):
+    whirl = Whirl(stop, 2e-3, 12.0)
+    orbit = solve_orbit(jeffcott([stop]), 12.0, guess=whirl.state * (1.0 + 1e-4))
+    moved = orbit.history(16)
+    radii = np.hypot(moved.displacement["x"], moved.displacement["y"])
+    assert radii == pytest.approx(whirl.r, rel=1e-12)
+    assert moved.force[:, 0] == pytest.approx(whirl.force, rel=1e-11)
+    assert orbit.max_penetration == pytest.approx(whirl.r - CLEARANCE, rel=1e-11)
+    assert orbit.impacts == 0  # it stays closed
+    gap = np.sort_complex(orbit.multipliers) - np.sort_complex(whirl.multipliers)
+    assert np.abs(gap).max() < 1e-11
+    assert orbit.liouville_error < 1e-11
+
+
+def test_friction_makes_the_whirl_unstable_where_the_frame_that_turns_says():
+    def growth(mu):
+        stop = RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=mu, surface_speed=5.0)
+        return stop, Whirl(stop, 2e-3, 12.0)
+
+    def fastest(mu):
+        return float(np.linalg.eigvals(growth(mu)[1].matrix).real.max())
+
+    onset = brentq(fastest, 1e-3, 0.05, xtol=1e-14)
+    for mu, stable in ((onset - 1e-8, True), (onset + 1e-8, False)):
+        stop, whirl = growth(mu)
+        assert solve_orbit(jeffcott([stop]), 12.0, guess=whirl.state).stable is stable
+
+
+def random_system(seed):
+    """Modes, a ring or a pin somewhere, and the same for the independent integration."""
+    rng = np.random.default_rng([64, seed])
+    n = int(rng.integers(2, 5))
+    half = rng.normal(size=(n, n))
+    M = np.diag(rng.uniform(0.5, 2.0, n))
+    K = half @ half.T * 1e3 + np.diag(rng.uniform(2e3, 2e4, n))
+    C = 0.002 * K + np.diag(rng.uniform(1.0, 5.0, n))
+    rows = np.eye(2, n) + (0.2 * rng.normal(size=(2, n)) if n > 2 else 0.0)
+    p, c = float(rng.choice([1.0, 1.5, 2.0])), rng.uniform(0.5e-3, 1e-3)
+    stop = RoundStop(
+        ("x", "y"), rng.uniform(2e4, 5e5) * 1e-4 ** (1.0 - p), c, p,
+        tuple(0.3 * c * rng.normal(size=2)), bool(rng.random() < 0.7),
+        dissipation=float(rng.choice([0.0, 0.2])), friction=float(rng.choice([0.0, 0.2])),
+        surface_speed=float(rng.choice([-20.0, 20.0])),
+    )  # fmt: skip
+    w, f, share = 2.0 * np.pi * rng.uniform(5.0, 40.0), rng.uniform(2.0, 20.0), rng.random()
+    system = System.from_matrices(
+        M, K, {"x": rows[0], "y": rows[1]}, damping=C, stops=[stop],
+        excitation=[
+            HarmonicForce("x", f), HarmonicForce("y", share * f, phase_deg=-90.0),
+            ConstantForce("x", 0.5 * f),
+        ],
+    )  # fmt: skip
+    ring = Ring(
+        rows, stop.stiffness, c, p, stop.eccentricity, stop.sense, stop.dissipation, stop.rub
+    )
+    rotor = Rotor(
+        M, C, K,
+        lambda t: f * (rows[0] * (math.cos(w * t) + 0.5) + rows[1] * share * math.sin(w * t)),
+        [ring],
+    )  # fmt: skip
+    near = c * (rng.uniform(0.5, 1.1) if stop.inside else rng.uniform(1.0, 1.6))
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    away = np.array(stop.eccentricity) + near * np.array([np.cos(angle), np.sin(angle)])
+    start = np.concatenate([np.linalg.pinv(rows) @ away, 0.1 * rng.normal(size=n)])
+    modes = sla.eigh(K, M)[1]
+    return system, rotor, w, start, sla.block_diag(modes, modes)
+
+
+def check_against_integration(seed):
+    system, rotor, w, start, basis = random_system(seed)
+    flow = FlowMap(system)
+    found = flow.shoot(flow.to_state(np.linalg.solve(basis, start))[None], PERIOD, w)
+    assert not found.failure
+    end, columns, _ = rotor.followed(start, 2.0 * np.pi / w, 2.0 * np.pi / w / 400, columns=True)
+    n = start.size // 2
+    ours = basis @ flow.to_modal(found.ends[0])
+    assert np.abs(ours - end)[:n].max() < 1e-8 * np.abs(end[:n]).max()
+    assert np.abs(ours - end)[n:].max() < 1e-8 * np.abs(end[n:]).max()
+    right, left = basis @ system.linear.right, system.linear.left @ np.linalg.inv(basis)
+    jacobian = right @ found.jacobians[0] @ left
+    assert np.abs(jacobian - columns).max() < 1e-6 * np.abs(columns).max()
+    return int(found.closings[0])
+
+
+@pytest.mark.parametrize("seed", [2, 8])
+def test_motions_are_those_of_an_independent_integration(seed):
+    check_against_integration(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", range(5))
+def test_random_motions_are_those_of_an_independent_integration(block):
+    hits = [check_against_integration(100 + 10 * block + k) for k in range(10)]
+    assert sum(hits) > 10
+
+
+PADS = 3e4  # N/m and rad
+
+
+def pressed_pads(depth, speed):
+    """Force of a ring of endlessly many pads, ∫ k (r cos φ - c) cos φ dφ where they press."""
+    radius = CLEARANCE + depth
+    x = 2.0 * math.atan2(math.sqrt(depth * (2.0 * CLEARANCE + depth)), CLEARANCE)
+    square = x * x
+    if x < 0.5:
+        wedge = 1.0 - square / 72.0 * (1.0 - square / 110.0 * (1.0 - square / 156.0))
+        wedge = x * square / 12.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * wedge))
+    else:
+        wedge = 0.5 * (x - math.sin(x))
+    return PADS * radius * wedge, 0.5 * PADS * (x + math.sin(x)), 0.0
+
+
+def check_polygons(numbers):
+    """Ends of motions between pads of the same stiffness per angle come to those in the ring."""
+    hertz = 4.0 / 3.0 * math.sqrt(2.0 / CLEARANCE) * PADS
+    ring = jeffcott([RoundStop(("x", "y"), hertz, CLEARANCE, law=pressed_pads)])
+    w, start = 2.0 * np.pi * 10.0, np.array([1.3e-3, 0.4e-3, -0.05, 0.12]) * math.sqrt(MASS)
+
+    def end(system):
+        flow = FlowMap(system)
+        found = flow.shoot(flow.to_state(start[None]), PERIOD, w)
+        assert not found.failure
+        return flow.to_modal(found.ends)[0]
+
+    true, errors = end(ring), []
+    for pads in numbers:
+        angles = 2.0 * np.pi * np.arange(pads) / pads
+        names = {f"pad {k}": [math.cos(a), math.sin(a)] for k, a in enumerate(angles)}
+        polygon = System.from_matrices(
+            MASS * np.eye(2), STIFFNESS * np.eye(2), {**PLANE, **names},
+            damping=DAMPING * np.eye(2), excitation=ring.excitation,
+            stops=[Stop.linear(name, 2.0 * np.pi * PADS / pads, gap=CLEARANCE) for name in names],
+        )  # fmt: skip
+        errors.append(float(np.linalg.norm(end(polygon) - true)) * pads**2)
+    assert all(error < 0.3 for error in errors[1:])  # pads² times as large
+    assert errors[1] < 0.5 * errors[0]  # eight pads are still coarser than that
+    return errors
+
+
+def test_pads_around_a_disc_come_to_a_ring():
+    pytest.importorskip("numba")
+    check_polygons((8, 32))
+
+
+@pytest.mark.slow
+def test_many_pads_do_with_the_square_of_their_number():
+    pytest.importorskip("numba")
+    errors = check_polygons((8, 32, 128))
+    assert errors[2] < 1.5 * errors[1]
+
+
+def test_derivatives_are_those_of_differences():
+    stop = RoundStop(
+        ("x", "y"), 5e4, CLEARANCE, 1.0, (1e-4, -2e-4), friction=0.1, surface_speed=-5.0,
+        dissipation=1.0,
+    )  # fmt: skip
+    flow, w = FlowMap(jeffcott([stop])), 2.0 * np.pi * 11.0
+    start = flow.to_state(np.array([[1.2e-3, 0.3e-3, 0.01, 0.05]]))
+    found = flow.shoot(start, PERIOD, w)
+    assert not found.failure and found.closings[0] >= 1
+
+    def by(change, step):
+        ends = [flow.shoot(*change(sign * step)).ends[0] for sign in (1.0, -1.0)]
+        return (ends[0] - ends[1]) / (2.0 * step)
+
+    columns = [
+        by(lambda h, e=e: (start + h * e, PERIOD, w), 1e-9) for e in np.eye(start.size)[:, None]
+    ]
+    assert np.abs(np.array(columns).T - found.jacobians[0]).max() < 1e-5
+    by_omega = by(lambda h: (start, PERIOD, w + h), 1e-5)
+    assert by_omega == pytest.approx(found.d_omega[0], abs=1e-6 * np.abs(by_omega).max())
+
+
+def test_a_whirl_as_fast_as_the_surface_is_refused():
+    stop = RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=0.05, surface_speed=-0.05)
+    flow, w = FlowMap(jeffcott([stop])), 2.0 * np.pi * 12.0
+    start = flow.to_state(Whirl(stop, 2e-3, 12.0).state[None])
+    assert "sliding speed" in flow.shoot(start, PERIOD, w).failure
+    other = RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=0.05, surface_speed=0.05)
+    flow = FlowMap(jeffcott([other]))
+    start = flow.to_state(Whirl(other, 2e-3, 12.0).state[None])
+    assert not flow.shoot(start, PERIOD, w).failure
+
+
+def test_a_drop_into_a_ring_keeps_its_energy():
+    weight = ConstantForce("x", 20.0)
+    free = System.from_matrices(
+        MASS * np.eye(2), np.zeros((2, 2)), PLANE, excitation=[weight],
+        stops=[RoundStop(("x", "y"), 5e6, CLEARANCE, eccentricity=(2e-4, 3e-4))],
+    )  # fmt: skip
+    flow, w = FlowMap(free), 2.0 * np.pi * 2.0
+    found = flow.trajectory(flow.to_state(np.zeros((1, 4))), PERIOD, w)
+    assert not found.failure and found.closings[0] > 5
+    states = flow.to_modal(found.states(np.linspace(*PERIOD, 400)))
+    depth, _ = free.depth_and_speed(free.stops[0], states)
+    stored = 5e6 * np.maximum(depth, 0.0) ** 2.5 / 2.5 - 20.0 * states[:, 0] / math.sqrt(MASS)
+    energy = 0.5 * (states[:, 2:] ** 2).sum(axis=1) + stored
+    assert np.abs(energy).max() < 1e-9 * np.abs(stored).max()
+
+
+def test_weight_rests_in_a_ring_beside_its_lowest_place_with_friction():
+    for mu in (0.0, 0.2):
+        stop = RoundStop(("x", "y"), 5e6, CLEARANCE, friction=mu, surface_speed=5.0)
+        drop = ConstantForce("x", 20.0)
+        system = System.from_matrices(MASS * np.eye(2), np.zeros((2, 2)), PLANE, stops=[stop],
+                                      excitation=[drop])  # fmt: skip
+        at = system.round_polar(stop, np.append(rest(system), [0.0, 0.0])[None])
+        force = stop.force(at.depth)[:, None] * stop.along(at)
+        assert force[0] == pytest.approx([20.0, 0.0], abs=1e-10)
+        assert math.atan2(*at.normal[0][::-1]) == pytest.approx(-math.atan(mu), abs=1e-12)
+
+
+def test_files_hold_round_stops(tmp_path):
+    stop = RoundStop(
+        ("x", "y"), 5e4, CLEARANCE, 1.0, (1e-4, -2e-4), friction=0.05, surface_speed=5.0,
+        dissipation=0.1,
+    )  # fmt: skip
+    system = jeffcott([Stop.linear("x", 1e3, gap=1.0), stop])
+    orbit = solve_orbit(system, 12.0, guess=Whirl(stop, 2e-3, 12.0).state)
+    branch = continue_branch(orbit, (11.9, 12.1))
+    save(branch, tmp_path / "branch.h5")
+    back = load(tmp_path / "branch.h5")[0]
+    assert back.points[0].system.stops == system.stops
+    assert back.points[-1].multipliers == pytest.approx(branch.points[-1].multipliers)
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"plane": "xy"}, "two interfaces"),
+        ({"plane": ("x", "x")}, "different"),
+        ({"clearance": 0.0}, "clearance must be positive"),
+        ({"clearance": -1e-3}, "clearance must be positive"),
+        ({"eccentricity": (0.0,)}, "two numbers"),
+        ({"friction": -0.1, "surface_speed": 1.0}, "friction must not be negative"),
+        ({"friction": 0.1}, "surface_speed"),
+        ({"stiffness": -1.0}, "stiffness must be positive"),
+        ({"against_plane": ("x", "z")}, "other interfaces"),
+    ],
+)
+def test_bad_numbers_are_told(values, said):
+    good = {"plane": ("x", "y"), "stiffness": 1e6, "clearance": 1e-3}
+    with pytest.raises(SystemModelError, match=said):
+        RoundStop(**{**good, **values})
+
+
+def test_unknown_interfaces_are_told():
+    with pytest.raises(SystemModelError, match="'z'"):
+        jeffcott([RoundStop(("x", "z"), 1e6, 1e-3)])
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_derivatives_by_parameters_are_those_of_differences(inside):
+    stop = RoundStop(
+        ("x", "y"), 5e4, CLEARANCE, 1.2, (1e-4, -2e-4), inside, friction=0.1, surface_speed=-5.0,
+        dissipation=1.0,
+    )  # fmt: skip
+    system, w = jeffcott([Stop.linear("x", 1e4, gap=1.6e-3), stop]), 2.0 * np.pi * 11.0
+    names = ("clearance", "stiffness", "exponent", "dissipation", "rubbing_friction",
+             "first_eccentricity", "second_eccentricity")  # fmt: skip
+    parameters = [Parameter(name, 1) for name in names]
+    start = (1.0 if inside else 0.4) * np.array([[1.7e-3, 0.5e-3, 0.01, 0.05]])
+    found = FlowMap(system).shoot(start, PERIOD, w, parameters=parameters)
+    assert not found.failure and np.all(found.d_parameters.any(axis=1))
+    for column, parameter in zip(found.d_parameters[0].T, parameters, strict=True):
+        value, errors = value_of(system, 11.0, parameter), []
+        for step in (1e-4 * abs(value), 1e-5 * abs(value)):
+            ends = [
+                FlowMap(with_value(system, parameter, value + sign * step))
+                .shoot(start, PERIOD, w).ends[0] for sign in (1.0, -1.0)
+            ]  # fmt: skip
+            change = (ends[0] - ends[1]) / (2.0 * step)
+            errors.append(np.abs(change - column).max() / np.abs(column).max())
+        assert min(errors) < 1e-5, parameter
