@@ -568,6 +568,42 @@ def simulate(
     return Told([*_shown(found.motion, hits, found.spectrum), written_by(out, "simulation")])
 
 
+@main.command()
+@writes_results()
+@click.option(
+    "--points",
+    type=click.IntRange(2, 1_000_000),
+    default=100,
+    show_default=True,
+    metavar="N",
+    help="Values of what [continuation] changes, equally spaced over its range.",
+)
+@click.option(
+    "--starts",
+    type=click.IntRange(0, 1_000_000),
+    default=0,
+    show_default=True,
+    metavar="N",
+    help="Random initial states at each value, beside the attractor of the value before.",
+)
+@jobs_option
+def sweep(work: Work, points: int, starts: int, jobs: int) -> Told:
+    """Simulate what motions of a scene settle on, up and down the range of its [continuation].
+
+    Over the frequency or another parameter, each time from the attractor of the value before.
+    Writes sweep.csv, a motion each, and a picture.
+    """
+    from nldyn.report.sweep import write_sweep
+    from nldyn.scene.sweep import sweep_of
+
+    scene, out = work.scene, work.out
+    found = sweep_of(
+        scene, points=points, starts=starts, progress=work.line.counted("sweeps"), jobs=jobs
+    )
+    write_sweep(found, out, scene.text, scene.title)
+    return Told([*_shown(found), written_by(out, "sweep")])
+
+
 def one_frequency_or_several_values(frequency_hz: float | None, over: int | None, **_: Any) -> None:
     """Refuse one frequency beside several values, and neither."""
     if (frequency_hz is None) == (over is None):

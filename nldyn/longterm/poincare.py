@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numbers
+from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ from nldyn.orbits.orbit import check_observe
 from nldyn.orbits.starts import random_states
 from nldyn.runtime.executors import check_execution, values_of
 from nldyn.runtime.progress import of_number, shows_progress
-from nldyn.system.chart import THE_FREQUENCY, value_of
+from nldyn.system.chart import THE_FREQUENCY, value_of, words_of
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
@@ -126,6 +127,13 @@ class BruteForce:
     observe: str
     columns: tuple[Column, ...]
     parameter: Parameter = THE_FREQUENCY
+
+    def __repr__(self) -> str:
+        """One line: how many motions at how many values, and what they settled on."""
+        kinds = Counter(column.attractor.kind for column in self.columns)
+        told = ", ".join(f"{kind}: {count}" for kind, count in kinds.items())
+        many = f"{len(self.columns)} motions at {len(set(self.values))} values"
+        return f"<BruteForce over {words_of(self.parameter)}: {many}, {told}>"
 
     @property
     def values(self) -> list[float]:
