@@ -5,14 +5,28 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
-from fem.formats.nastran.cards import Line
+from fem.base.errors import ModelError
+from fem.formats.nastran.cards import CASES, Line
 
 CHOICES = ("SPC", "MPC", "K2GG", "M2GG", "B2GG", "K2PP", "M2PP", "B2PP", "AUTOSPC")
 BEGIN = re.compile(r"\s*BEGIN(\s+BULK|\s*$|\s+\w+\s*=)", re.IGNORECASE)
 PARAM = re.compile(r"\s*PARAM\s*,", re.IGNORECASE)
 """A card that may stand before the bulk data, too."""
 SUPER = re.compile(r"\s*BEGIN\s+(BULK\s+)?(SUPER|AUXMODEL)\s*=", re.IGNORECASE)
+
+
+CASE = re.compile(r"\s*(SUBCASE|SUBCOM|SYM|SYMCOM|REPCASE)\b", re.IGNORECASE)
+"""A line that begins a case; what stands above the first one holds where a case says nothing."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a line of case control chooses."""
+
+    value: str
+    line: Line
 
 
 @dataclass
@@ -23,43 +37,59 @@ class Control:
     ----------
     there
         Whether there is any case control.
-    chosen
-        All values of each choice, in the order of the cases.
+    above
+        Choices above the first case, by name.
+    cases
+        Those of each case.
     """
 
     there: bool = False
-    chosen: dict[str, list[str]] = field(default_factory=dict)
+    above: dict[str, Choice] = field(default_factory=dict)
+    cases: list[dict[str, Choice]] = field(default_factory=list)
 
-    def first(self, name: str) -> str:
-        """The value that the first case has which has one; an empty text without any."""
-        return next(iter(self.chosen.get(name, [])), "")
-
-    def others(self, name: str) -> list[str]:
-        """Further values that later cases have."""
-        return self.chosen.get(name, [])[1:]
+    def choices(self, name: str) -> list[Choice]:
+        """What the cases choose, each value once: a case's own choice, or that above all cases."""
+        each = [case.get(name, self.above.get(name)) for case in self.cases or [{}]]
+        return list({choice.value: choice for choice in each[::-1] if choice}.values())[::-1]
 
 
-def divided(lines: Sequence[Line]) -> tuple[Control, list[Line], list[Line]]:
-    """The case control, the lines of the bulk data, and those that begin a superelement."""
+def divided(lines: Sequence[Line], source: Path) -> tuple[Control, list[Line], list[Line]]:
+    """The case control, the lines of the bulk data, and those that begin a superelement.
+
+    Raises
+    ------
+    ModelError
+        If one case chooses twice.
+    """
     starts = [i for i, line in enumerate(lines) if BEGIN.match(line.text)]
     control, bulk = Control(), list(lines)
     if starts:
-        for line in lines[: starts[0]]:
-            _read(control, line.text)
-        parameters = [line for line in lines[: starts[0]] if PARAM.match(line.text)]
+        before = lines[: starts[0]]
+        parameters = [line for line in before if PARAM.match(line.text)]
         bulk = [*parameters, *lines[starts[0] + 1 :]]
+        begun: Line | None = None
+        for line in before:
+            if begun is not None:  # a line that ends with a comma goes on in the next one
+                line = Line(begun.text + line.text, begun.file, begun.number)
+            begun = line if line.text.endswith(",") and not PARAM.match(line.text) else None
+            if begun is None:
+                _read(control, line, source)
     other = [line for line in lines if SUPER.match(line.text)]
     return control, bulk, other
 
 
-def _read(control: Control, text: str) -> None:
-    control.there = control.there or bool(re.match(r"\s*(CEND|SUBCASE)\b", text, re.IGNORECASE))
-    found = re.match(r"\s*(\w+)(?:\(.*?\))?\s*=\s*(.+)", text)
-    if found is None:
+def _read(control: Control, line: Line, source: Path) -> None:
+    case = CASE.match(line.text)
+    control.there = control.there or bool(case or CASES.match(line.text))
+    if case:
+        control.cases.append({})
+    found = re.match(r"\s*(\w+)(?:\(.*?\))?\s*=\s*(.+)", line.text)
+    if found is None or (name := found[1].upper()) not in CHOICES:
         return
-    name = found[1].upper()
-    if name in CHOICES:
-        values = control.chosen.setdefault(name, [])
-        value = found[2].strip().upper()
-        if value not in values:
-            values.append(value)
+    choice = Choice(found[2].strip().upper(), line)
+    before = (control.cases[-1] if control.cases else control.above).setdefault(name, choice)
+    if before.value != choice.value:
+        raise ModelError(
+            f"{source}: {line.place(source)}: {name} = {choice.value}: its case chooses"
+            f" {name} = {before.value} already, in {before.line.place(source)}; keep one"
+        )

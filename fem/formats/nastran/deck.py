@@ -11,7 +11,7 @@ import numpy as np
 from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError
 from fem.formats.nastran.cards import INCLUDE, Card, cards_of, lines_of
-from fem.formats.nastran.control import Control, divided
+from fem.formats.nastran.control import Choice, Control, divided
 from fem.formats.nastran.known import FIELDS, LEFT_OUT, READ, advice
 from fem.formats.nastran.systems import CARDS as SYSTEM_CARDS
 from fem.formats.nastran.systems import Systems
@@ -116,6 +116,16 @@ class Deck:
         """What is left out, for a mesh."""
         return [LeftOut(n, t.count, t.place, t.reason) for n, t in self.left.items()]
 
+    def choice(self, name: str) -> Choice | None:
+        """What the first case chooses that chooses; that of others is told."""
+        found = self.control.choices(name)
+        for other in found[1:]:
+            self.notes.append(
+                f"{self.source}: {name} = {found[0].value} of the first case that has one is"
+                f" taken, not {name} = {other.value}"
+            )
+        return found[0] if found else None
+
     def parameter(self, name: str, default: float) -> float:
         """The number of a ``PARAM``."""
         for card in self.of("PARAM"):
@@ -156,7 +166,7 @@ def read_deck(path: Path, folders: Sequence[Path], ignore: Iterable[str]) -> Dec
     for line in lines:
         if INCLUDE.match(line.text):  # those of bulk data have become the lines that they hold
             deck.leave_out("INCLUDE of executive control", line.place(path), NO_BULK_DATA)
-    deck.control, bulk, supers = divided(lines)
+    deck.control, bulk, supers = divided(lines, path)
     for line in supers:
         raise ModelError(f"{path}: line {line.number}: {line.text.strip()}: {SUPERELEMENTS}")
     for card in cards_of(bulk, path):

@@ -158,7 +158,8 @@ class Gathered:
 
     def _autospc(self) -> bool:
         words = [card.text(1) for card in self.deck.of("PARAM") if card.text(0) == "AUTOSPC"]
-        words += filter(None, [self.deck.control.first("AUTOSPC")])
+        chosen = self.deck.choice("AUTOSPC")
+        words += [chosen.value] if chosen else []
         return words[-1:] not in (["NO"], ["N"])
 
     def content(self) -> MeshContent:

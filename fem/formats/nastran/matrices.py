@@ -9,6 +9,8 @@ import numpy as np
 
 from fem.base.errors import ModelError
 from fem.formats.nastran.cards import Card
+from fem.formats.nastran.control import Choice
+from fem.formats.nastran.deck import Deck
 from fem.formats.nastran.gathered import Gathered
 
 CHOICES = {"K2GG": "stiffness", "M2GG": "mass", "B2GG": "damping"}
@@ -33,17 +35,16 @@ def read_matrices(gathered: Gathered) -> None:
     found = _all(deck.of("DMIG"))
     used = set()
     for choice, kind in CHOICES.items():
-        value = deck.control.first(choice)
-        if not value:
+        if (chosen := deck.choice(choice)) is None:
             continue
-        for name in re.split(r"\s*[,+]\s*|\s+", value):
+        for factor, name in _named(deck, choice, chosen):
             if name not in found:
-                raise ModelError(f"{deck.source}: {choice} = {value}: there is no DMIG {name!r}")
+                raise _fault(deck, choice, chosen, f"there is no DMIG {name!r}")
             used.add(name)
-            _add(gathered, kind, name, found[name])
+            _add(gathered, kind, name, found[name], factor)
     for choice in IN_RESPONSES:
-        if deck.control.first(choice):
-            name = deck.control.first(choice)
+        if chosen := deck.choice(choice):
+            name = chosen.value
             used.add(name)
             place = found[name].card.place if name in found else "case control"
             deck.leave_out(choice, place, "it acts in responses only, not in modes")
@@ -51,6 +52,22 @@ def read_matrices(gathered: Gathered) -> None:
         if name not in used:
             reason = "no K2GG, M2GG or B2GG of case control names it"
             deck.leave_out(f"DMIG {name}", matrix.card.place, reason)
+
+
+def _fault(deck: Deck, name: str, choice: Choice, text: str) -> ModelError:
+    place = choice.line.place(deck.source)
+    return ModelError(f"{deck.source}: {place}: {name} = {choice.value}: {text}")
+
+
+def _named(deck: Deck, name: str, choice: Choice) -> list[tuple[float, str]]:
+    """Factors and names of "A", "A, B" and "2.0*A, 0.5*B", which may stand in parentheses."""
+    words = re.split(r"\s*,\s*", choice.value.strip("() "))
+    found = [re.fullmatch(r"(?:([-+.\dE]+) *\* *)?([A-Z]\w*)", word) for word in words]
+    try:
+        return [(float(m[1] or 1.0), m[2]) for m in found]  # type: ignore[index]
+    except (TypeError, ValueError):
+        fault = "is not read; name matrices of DMIG as A, B or 2.0*A, 0.5*B"
+        raise _fault(deck, name, choice, fault) from None
 
 
 def _all(cards: list[Card]) -> dict[str, _Matrix]:
@@ -77,7 +94,7 @@ def _column(card: Card, matrix: _Matrix) -> None:
                 matrix.values[column, row] = value
 
 
-def _add(gathered: Gathered, kind: str, name: str, matrix: _Matrix) -> None:
+def _add(gathered: Gathered, kind: str, name: str, matrix: _Matrix, factor: float) -> None:
     card = matrix.card
     if card.whole(2) not in (SYMMETRIC, SQUARE) or card.whole(3) not in (1, 2):
         raise card.fail("must be symmetric (6) or square (1) and real (1 or 2)")
@@ -89,7 +106,7 @@ def _add(gathered: Gathered, kind: str, name: str, matrix: _Matrix) -> None:
     at = {entry: i for i, entry in enumerate(entries)}
     full = np.zeros((len(entries), len(entries)))
     for (row, column), value in matrix.values.items():
-        full[at[row], at[column]] = value
+        full[at[row], at[column]] = factor * value
     if not np.allclose(full, full.T, rtol=1e-9, atol=1e-9 * np.abs(full).max(initial=0.0)):
         raise card.fail(f"{name} is not symmetric")
     for grid, component in entries:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fem.base.errors import ModelError
 from fem.formats.nastran.cards import Card
 from fem.formats.nastran.deck import DIRECTIONS, Deck
 from fem.formats.nastran.gathered import Gathered
@@ -21,15 +22,28 @@ def chosen_sets(deck: Deck, name: str, sums: str, *cards: str) -> frozenset[int]
 
     Where there is no case control, the one set that there is; with it, what the first case
     chooses. What is not chosen is told.
+
+    Raises
+    ------
+    ModelError
+        If a set that is chosen or added is not there, unless cards of its kind are ignored. That
+        MPC chooses one where the deck has no equations at all is told, as Nastran runs such decks.
     """
     given = {card.whole(0) for card in deck.of(*cards)}
     adding = {card.whole(0): card for card in deck.of(sums)}
-    value = deck.control.first(name)
+    certain = deck.ignored.isdisjoint({sums, *cards})
+    choice = deck.choice(name)
     chosen: set[int] = set()
-    if value.isdigit():
-        chosen = {int(value)}
-        if not chosen <= given | set(adding):
-            deck.notes.append(f"{deck.source}: {name} = {value} chooses a set that is not there")
+    if choice and choice.value.isdigit():
+        chosen = {int(choice.value)}
+        told = f"{deck.source}: {choice.line.place(deck.source)}: {name} = {choice.value} chooses"
+        if certain and name == "MPC" and not given | set(adding):
+            deck.notes.append(f"{told} a set, but the deck has no {name}")
+        elif certain and not chosen <= given | set(adding):
+            raise ModelError(
+                f"{told} a set that is not there; give its {' or '.join(cards)}, or take the line"
+                " out"
+            )
     elif not deck.control.there and len(given | set(adding)) >= 1:
         tops = set(adding) or given
         if len(tops) == 1:
@@ -38,13 +52,13 @@ def chosen_sets(deck: Deck, name: str, sums: str, *cards: str) -> frozenset[int]
                 f"{deck.source}: there is no case control; {name} = {min(tops)}, the only set, is"
                 " taken"
             )
-    for other in deck.control.others(name):
-        deck.notes.append(
-            f"{deck.source}: {name} = {value} of the first case is taken, not {name} = {other}"
-        )
     for number in list(chosen):
         if number in adding:
-            chosen |= set(adding[number].wholes(1))
+            parts = set(adding[number].wholes(1))
+            if certain and not parts <= given:
+                missing = ", ".join(map(str, sorted(parts - given)))
+                raise adding[number].fail(f"adds the set {missing}, which is not there")
+            chosen |= parts
     for card in deck.of(*cards):
         if card.whole(0) not in chosen:
             reason = f"no {name} of case control chooses the set {card.whole(0)}"

@@ -26,7 +26,9 @@ MAT1,1,2.+11,,.3,8000.
 HELD = "SPC1,1,123456,1,THRU,8\n"
 
 
-def read(tmp_path, more, case="SPC = 1"):
+def read(tmp_path, more, case=None):
+    if case is None:
+        case = "SPC = 1" if "SPC1,1," in more or "SPC1    1 " in more else ""
     path = tmp_path / "deck.bdf"
     path.write_text(f"SOL 103\nCEND\n{case}\nBEGIN BULK\n{BRICK}{more}ENDDATA\n")
     return fem.read_structure(path)
@@ -118,23 +120,66 @@ def test_masses_have_numbers_of_their_own_and_directions_may_have_blanks(tmp_pat
 
 def test_case_control_chooses_supports_and_all_else_is_told(tmp_path):
     cards = "SPC1,1,123,1,2\nSPC,2,3,12\nSPCADD,5,1,2\nSPC1,7,3,8\n"
-    mesh = read(tmp_path, cards, "SPC = 5\nSUBCASE 2\nSPC = 7")
+    mesh = read(tmp_path, cards, "SPC = 7\nSUBCASE 2\nSPC = 5")
     held = {s.point: (s.directions, mesh.point_sets[s.point].tolist()) for s in
             mesh.attachments.supports}  # fmt: skip
     assert held == {
         "SPC 1 2 5 x y z": (("x", "y", "z"), [0, 1]),
         "SPC 1 2 5 x y": (("x", "y"), [2]),
     }
-    assert "SPC = 5 of the first case is taken, not SPC = 7" in mesh.notes[0]
+    assert not mesh.notes
     assert [str(item) for item in mesh.left_out] == [
         "SPC1 7 (1, first in line 22): no SPC of case control chooses the set 7"
     ]
     assert not read(tmp_path, cards, "").attachments.supports
-    assert "SPC = 6 chooses a set that is not there" in read(tmp_path, cards, "SPC = 6").notes[0]
+    with pytest.raises(fem.ModelError, match="line 3: SPC = 6 chooses a set that is not there"):
+        read(tmp_path, cards, "SPC = 6")
+    with pytest.raises(fem.ModelError, match="line 21: SPCADD: adds the set 9, which is not there"):
+        read(tmp_path, cards + "SPCADD,8,1,9\n", "SPC = 8")
+    assert (
+        "MPC = 4 chooses a set, but the deck has no MPC" in read(tmp_path, "", "MPC = 4").notes[0]
+    )
     path = tmp_path / "bulk.bdf"
     path.write_text(BRICK + "SPC1,3,123,1,THRU,4\n")
     alone = fem.read_structure(path)
     assert alone.attachments.supports and "SPC = 3, the only set, is taken" in alone.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("case", "omega", "said"),
+    [
+        ("SPC = 9\nSUBCASE 1\nSPC = 1", 2.0, "SPC1 9"),
+        ("SPC = 1\nMPC = 5\nSUBCASE 1\nMPC = 6", np.sqrt(104.0 / 2.0), "MPC 5"),
+        ("SPC = 1\nK2GG = A\nSUBCASE 1\nK2GG = B", 3.0, "DMIG A"),
+        ("SPC = 1\nK2GG = (2.0*A,\n 0.5*B)\nSUBCASE 1", np.sqrt(4.0 + 12.0 + 2.5), None),
+        ("SPC = 1\nSUBCASE 1\nSUBCASE 2\nK2GG = B", 3.0, "DMIG A"),
+    ],
+)
+def test_the_choice_inside_a_case_beats_that_above_all_cases(tmp_path, case, omega, said):
+    """A mass of 1 on a spring of 4; equations tie another mass to it, matrices stiffen it."""
+    cards = (
+        "GRID,20,,5.,5.,5.\nCMASS2,9,1.,20,1\nCELAS2,10,4.,20,1\nSPC1,1,23,20\nSPC1,9,1,20\n"
+        "GRID,21,,6.,5.,5.\nSPC1,1,123,21\nSPOINT,30\nCMASS2,11,1.,30\nCELAS2,12,100.,30\n"
+        "SPOINT,31\nCMASS2,13,1.,31\nCELAS2,14,400.,31\n"
+        "MPC,5,31,,1.,20,1,-1.\nMPC,6,30,,1.,20,1,-1.\n"
+        "DMIG,A,0,6,1,0\nDMIG,A,20,1,,20,1,6.\nDMIG,B,0,6,1,0\nDMIG,B,20,1,,20,1,5.\n"
+    )
+    mesh = read(tmp_path, cards + HELD, case)
+    assert 2.0 * np.pi * hz(assembled(mesh))[0] == pytest.approx(omega, rel=1e-9)
+    assert said is None or said in [item.keyword for item in mesh.left_out]
+    assert not mesh.notes
+
+
+def test_what_other_cases_choose_is_told_and_what_one_case_chooses_twice_refused(tmp_path):
+    cards = HELD + "SPC1,7,123,1\nDMIG,A,0,6,1,0\nDMIG,B,0,6,1,0\n"
+    case = "K2GG = A\nSUBCASE 1\nSPC = 1\nSUBCASE 2\nSPC = 7\nK2GG = B"
+    told = " ".join(read(tmp_path, cards, case).notes)
+    assert "SPC = 1 of the first case that has one is taken, not SPC = 7" in told
+    assert "K2GG = A of the first case that has one is taken, not K2GG = B" in told
+    with pytest.raises(fem.ModelError, match="line 4: SPC = 7: its case chooses SPC = 1 already"):
+        read(tmp_path, cards, "SPC = 1\nSPC = 7")
+    with pytest.raises(fem.ModelError, match=r"line 4: K2GG = 2.0A: is not read; name matrices"):
+        read(tmp_path, cards, "SPC = 1\nK2GG = 2.0A")
 
 
 @pytest.mark.parametrize(
