@@ -219,7 +219,7 @@ class StatePlane:
         Parameters
         ----------
         attractors : sequence of Attractor
-            At least one, all of one system and frequency.
+            At least one, all of one system, at one frequency or value of a parameter or at several.
         x, y : ({"displacement", "velocity"}, str)
             What is on either axis, of which interface.
         x_range, y_range : (float, float), optional
