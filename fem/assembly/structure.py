@@ -29,7 +29,7 @@ from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import JointWarning, ModelError
 from fem.checks.conforming import check_conforming
 from fem.checks.distorted import distortion_warnings
-from fem.checks.hanging import check_nothing_hangs
+from fem.checks.hanging import boundary, check_nothing_hangs
 from fem.checks.locking import locking_warnings
 from fem.checks.mechanisms import joint_warnings, mechanism_warnings
 from fem.checks.neighbours import check_not_folded
@@ -204,15 +204,16 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     check_masses_carried(model)
     for text in unlikely(model):
         warnings.warn(text, UnlikelyWarning, stacklevel=3)
-    for text in locking_warnings(model):
+    looked_at = boundary(model)
+    for text in locking_warnings(model, looked_at):
         warnings.warn(text, LockingWarning, stacklevel=3)
     for text in distortion_warnings(model):
         warnings.warn(text, DistortionWarning, stacklevel=3)
     numbering = number_blocks(model)
     constraints = constrain(model, numbering)
     stiffness, mass = unconstrained_matrices(model, numbering)
-    check_nothing_hangs(model)
-    for text in overlap_warnings(model):
+    check_nothing_hangs(model, looked_at)
+    for text in overlap_warnings(model, looked_at):
         warnings.warn(text, JointWarning, stacklevel=3)
     K = constraints.reduced(stiffness)
     del stiffness

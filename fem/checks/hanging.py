@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -74,7 +75,27 @@ class Facets:
         return np.asarray(away.max(axis=1), dtype=np.float64)
 
 
-def check_nothing_hangs(model: StructureModel) -> None:
+class Boundary(NamedTuple):
+    """Where cells may lie against others; None without solids, without shells.
+
+    Parameters
+    ----------
+    outer
+        The outer faces of solids; in the plane, their outer edges.
+    edges
+        The edges of shells, each once.
+    """
+
+    outer: Facets | None
+    edges: Facets | None
+
+
+def boundary(model: StructureModel) -> Boundary:
+    """The outer faces and the edges of a structure."""
+    return Boundary(outer_facets(model), facets_of_shells(model))
+
+
+def check_nothing_hangs(model: StructureModel, looked_at: Boundary) -> None:
     """Refuse cells that lie against each other but do not have the same nodes there.
 
     Looked at are the flat outer faces of solids, in the plane their straight outer edges, and the
@@ -102,7 +123,7 @@ def check_nothing_hangs(model: StructureModel) -> None:
     >>> part = {"plate": fem.ShellPart(fem.Material(2.1e11, 7800.0, 0.3), 0.01)}
     >>> model = fem.StructureModel(fem.joined(plates), part)
     >>> try:
-    ...     check_nothing_hangs(model)
+    ...     check_nothing_hangs(model, boundary(model))
     ... except fem.ModelError as error:
     ...     print(str(error).split("; ")[0].split(": ", 1)[1])
     3 edges lie against others without having their nodes, the first at (1, 0.25, 0), between \
@@ -110,7 +131,7 @@ quad 0 at (0.5, 0.5, 0) and quad 1 at (1.5, 0.25, 0)
     """
     if model.separate:
         return
-    for facets in (outer_facets(model), facets_of_shells(model)):
+    for facets in looked_at:
         if facets is not None:
             _refuse(model, facets)
 
@@ -198,7 +219,10 @@ def _once(model: StructureModel, blocks: list[Sides]) -> Facets:
 
 
 def _with_normals(model: StructureModel, facets: Facets) -> Facets:
-    """The same with unit normals that point away from the middle of each cell."""
+    """The same with unit normals that point away from the middle of each cell's corners.
+
+    The middle of all nodes of a thin curved cell may lie beyond the plane of a face's corners.
+    """
     corners = facets.places
     if _lines(facets):
         normals = (corners[:, 1] - corners[:, 0])[:, [1, 0, 2]] * [1.0, -1.0, 0.0]
@@ -208,7 +232,8 @@ def _with_normals(model: StructureModel, facets: Facets) -> Facets:
     for code in np.unique(facets.kinds):
         of_kind = facets.kinds == code
         cells = model.mesh.cells[NAMES[code]][facets.numbers[of_kind]]
-        inside[of_kind] = model.mesh.points[cells].mean(axis=1)
+        corners_only = cells[:, : len(KINDS[NAMES[code]].corners)]
+        inside[of_kind] = model.mesh.points[corners_only].mean(axis=1)
     outward = np.sign(np.einsum("fi,fi->f", normals, facets.centres - inside))
     length = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(np.float64).tiny)
     return replace(facets, normals=normals * (outward / length)[:, None])

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 
 from fem.base.arrays import FloatArray, IntArray
-from fem.checks.hanging import NAMES, Facets, facets_of_shells, held_nodes, outer_facets, told_cell
+from fem.checks.hanging import NAMES, Boundary, Facets, held_nodes, told_cell
 from fem.mesh.cells import KINDS, CellKind
 from fem.mesh.pieces import place_of
 from fem.model.structure import StructureModel
@@ -23,7 +23,7 @@ NEAR = 0.05
 STEPS = 8
 
 
-def overlap_warnings(model: StructureModel) -> Iterator[str]:
+def overlap_warnings(model: StructureModel, looked_at: Boundary) -> Iterator[str]:
     """One sentence if cells share nodes on a curved face but lie there against other nodes.
 
     Curved faces of cells that do not conform fit together roughly only, so that this is told where
@@ -34,6 +34,7 @@ def overlap_warnings(model: StructureModel) -> Iterator[str]:
     Examples
     --------
     >>> import fem
+    >>> from fem.checks.hanging import boundary
     >>> def ring(radius, around):
     ...     flat = fem.box_mesh("ring", (0.5, 1.0), (1, around), kind="quad8",
     ...         origin=(radius, 0.0, 0.0))
@@ -41,14 +42,15 @@ def overlap_warnings(model: StructureModel) -> Iterator[str]:
     ...     return flat.with_points(np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1))
     >>> sheet = fem.SolidPart(fem.Material(2.1e11, 7800.0, 0.3), "stress", 0.01)
     >>> both = fem.joined([ring(0.5, 2), ring(1.0, 4)])
-    >>> [said] = overlap_warnings(fem.StructureModel(both, {"ring": sheet}))
+    >>> model = fem.StructureModel(both, {"ring": sheet})
+    >>> [said] = overlap_warnings(model, boundary(model))
     >>> said.split(": ")[1].split(", ")[0]
     '4 nodes lie on curved faces of cells that do not have them'
     """
     if model.separate:
         return
     held = held_nodes(model)
-    for facets in (outer_facets(model), facets_of_shells(model)):
+    for facets in looked_at:
         if facets is None:
             continue
         cells, nodes, owners = _candidates(model, facets, held)

@@ -245,15 +245,16 @@ def hemisphere(kind):
 RADII = (3.0, 3.5, 4.2, 5.2, 6.75, 9.0)
 
 
+def tube(a, b, h):
+    """Where a quarter of the thick cylinder has its nodes."""
+    turn, radius = np.pi / 2 * a, np.interp(5 * b, range(6), RADII)
+    return radius * np.cos(turn), radius * np.sin(turn), h
+
+
 def cylinder(kind, poisson):
     """A quarter of a thick cylinder in plane strain, 1 long, under a pressure of 1 inside."""
-
-    def place(a, b, h):
-        turn, radius = np.pi / 2 * a, np.interp(5 * b, range(6), RADII)
-        return radius * np.cos(turn), radius * np.sin(turn), h
-
     held = {"x0": ("y",), "x1": ("x",), "z0": ("z",), "z1": ("z",)}
-    quarter = body(kind, (9, 5), place, 1.0, 1000.0, poisson, held)
+    quarter = body(kind, (9, 5), tube, 1.0, 1000.0, poisson, held)
     share = quarter.end("y0")
     points = quarter.component.model.mesh.points
     outwards = points * (1.0, 1.0, 0.0) / np.linalg.norm(points[:, :2], axis=1)[:, None]

@@ -9,7 +9,7 @@ from structures import CLAMP, STEEL, flexibility, lowest_hz
 from with_gmsh import gmsh_at_work
 
 import fem
-from fem.checks.hanging import check_nothing_hangs
+from fem.checks.hanging import boundary, check_nothing_hangs
 from fem.checks.overlapping import overlap_warnings
 
 E, LENGTH, THICKNESS = 2.0e11, 2.0, 0.01
@@ -67,7 +67,8 @@ def test_a_web_with_more_cells_than_the_flange_it_stands_on_is_refused():
     with pytest.raises(fem.ModelError, match=r"6 edges lie against others .* quad 0 at"):
         fem.assemble(model_of(fem.joined([flange, upright]), SHELL))
     finer = fem.box_mesh("flange", (1.0, 1.0), (4, 2), kind="quad")
-    check_nothing_hangs(model_of(fem.joined([finer, upright]), SHELL))
+    model = model_of(fem.joined([finer, upright]), SHELL)
+    check_nothing_hangs(model, boundary(model))
 
 
 def pulled(mesh, part, **more):
@@ -127,7 +128,8 @@ def test_a_node_that_equations_tie_to_the_edge_it_lies_on_does_not_hang():
     ],
 )  # fmt: skip
 def test_gaps_conforming_halves_and_corners_are_let_be(meshes, part):
-    check_nothing_hangs(model_of(fem.joined(meshes), part))
+    model = model_of(fem.joined(meshes), part)
+    check_nothing_hangs(model, boundary(model))
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -146,8 +148,8 @@ def test_a_mesh_of_gmsh_in_which_sizes_change_is_let_be(order, tmp_path):
         gmsh.model.mesh.setOrder(order)
         gmsh.write(str(tmp_path / "body.msh"))
     model = model_of(fem.read_structure(tmp_path / "body.msh"), fem.SolidPart(STEEL))
-    check_nothing_hangs(model)
-    assert not list(overlap_warnings(model))
+    check_nothing_hangs(model, boundary(model))
+    assert not list(overlap_warnings(model, boundary(model)))
 
 
 def ring(radius, around, kind):
@@ -172,11 +174,11 @@ def test_cells_that_hang_on_a_curved_face_are_told_of(kind, around, nodes):
     other = around + 1 if around == 3 else 2 * around
     part = fem.SolidPart(STEEL)
     torn = model_of(fem.joined([ring(0.5, around, kind), ring(1.0, other, kind)]), part)
-    [said] = overlap_warnings(torn)
+    [said] = overlap_warnings(torn, boundary(torn))
     assert f": {nodes} nodes lie on curved faces of cells that do not have them" in said
-    assert not list(overlap_warnings(replace(torn, separate=True)))
+    assert not list(overlap_warnings(replace(torn, separate=True), boundary(torn)))
     whole = model_of(fem.joined([ring(r, around, kind) for r in (0.5, 1.0)]), part)
-    assert not list(overlap_warnings(whole))
+    assert not list(overlap_warnings(whole, boundary(whole)))
 
 
 def test_a_hanging_curved_face_is_told_when_the_model_is_assembled():

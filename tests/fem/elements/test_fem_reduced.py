@@ -4,9 +4,13 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 from structures import STEEL, lowest_hz
 
 import fem
+from fem.elements.solids import gradients_and_volumes
+from fem.mesh.cells import KINDS
 from fem.mesh.element_types import integration
 
 
@@ -51,17 +55,46 @@ def test_a_ring_of_short_cells_in_full_is_not_warned_of():
         assembled(ring(0.05, 48), integration="full")
 
 
-@pytest.mark.parametrize("holes", [8, 16])
-def test_a_hole_in_a_wide_plate_is_not_taken_for_a_thin_part(holes):
-    """The wall of a hole is curved, but what lies behind it is not thin."""
-    mesh = fem.box_mesh("plate", (1.0, 1.0, 0.1), (holes, 3, 1), kind="hexahedron27")
+def plate_with_a_hole(around):
+    """A disk of radius 1 m, 0.1 m thick, with a hole of 0.1 m in its middle."""
+    mesh = fem.box_mesh("plate", (1.0, 1.0, 0.1), (around, 3, 1), kind="hexahedron27")
     a, b, z = mesh.points.T
-    turn, radius = 2 * np.pi * a, 0.1 * 10.0**b
-    points = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), z])
+    turn, radius = 2 * np.pi * a, 0.1 + 0.9 * b
+    points = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), z - 0.05])
     plate = fem.joined([mesh.with_points(points)])
+    return fem.StructureModel(plate, {"plate": fem.SolidPart(STEEL)})
+
+
+def stiffness_in_even_bending(component):
+    """Over the right one: forces of a stress x'x z over the motion that they should cause."""
+    mesh, material = component.model.mesh, component.model.parts["plate"].material
+    kind, cells = KINDS["hexahedron27"], mesh.cells["hexahedron27"]
+    places, weights = kind.quadrature
+    gradients, volumes = gradients_and_volumes(kind, mesh.points[cells], places)
+    weights = weights * np.abs(volumes)
+    height = (mesh.points[cells] @ [0.0, 0.0, 1.0]) @ kind.basis(places)[0].T
+    force = np.zeros(mesh.points.shape)
+    np.add.at(force[:, 0], cells, np.einsum("eq,eqb->eb", weights * height, gradients[..., 0]))
+    right = np.sum(weights * height**2) / material.youngs_modulus
+    K = component.stiffness
+    ridge = 1e-12 * K.diagonal().max() * sparse.eye_array(K.shape[0])
+    return right / (force.ravel() @ spsolve(sparse.csc_array(K + ridge), force.ravel()))
+
+
+def test_a_hole_in_a_wide_plate_is_not_taken_for_a_thin_part():
+    """The wall of a hole is curved, but what lies behind it is not thin."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", fem.LockingWarning)
-        fem.assemble(fem.StructureModel(plate, {"plate": fem.SolidPart(STEEL)}))
+        component = fem.assemble(plate_with_a_hole(16))
+    assert stiffness_in_even_bending(component) == pytest.approx(1.01, abs=0.01)
+
+
+def test_curved_edges_in_the_plane_of_a_plate_stiffen_it():
+    with pytest.warns(fem.LockingWarning, match="they are curved by") as caught:
+        component = fem.assemble(plate_with_a_hole(8))
+    said = float(str(caught[0].message).split("about ")[1].split(" times")[0])
+    found = stiffness_in_even_bending(component)
+    assert 1.05 < found < said < 1.0 + 5.0 * (found - 1.0)
 
 
 @pytest.mark.parametrize(

@@ -131,7 +131,7 @@ def test_what_the_system_does_not_have_is_refused_before_any_search(old, new, sa
 
 
 def test_seeds_are_values_of_the_parameter():
-    seed = '[[subharmonics]]\nperiod = 2\n'
+    seed = "[[subharmonics]]\nperiod = 2\n"
     assert parse_scene(TEXT + seed + "near = 1e-5").subharmonics[0].place == 1e-5
     with pytest.raises(SceneError, match="needs 'near', and no 'near_hz'"):
         parse_scene(TEXT + seed + "near_hz = 20.0")

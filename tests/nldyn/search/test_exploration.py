@@ -656,9 +656,7 @@ def test_a_doubled_branch_begins_at_its_flip():
 def test_where_a_doubled_branch_comes_to_its_flip_the_other_one_has_half_the_period():
     """Followed on as a branch of the doubled period it would be the same orbits twice."""
     flow, axis = FlowMap(system_of("one_dof")), Axis.in_frequency((28.0, 60.0))
-    box, other = (
-        Collector(flow, axis, "middle", ContinuationOptions(), silent) for _ in range(2)
-    )
+    box, other = (Collector(flow, axis, "middle", ContinuationOptions(), silent) for _ in range(2))
     box.from_orbits([solve_orbit(flow, 50.0)])
     harmonic = box.branches[0]
     box.from_flip(next(s for s in harmonic.special_points if s.kind == "PD"))
@@ -710,8 +708,7 @@ def test_branches_taken_back_leave_a_search_as_it_was():
     options = ContinuationOptions(max_points=32)
     axis = Axis.in_frequency((11.0, 11.8))
     first, again = (
-        Collector(orbit.problem.flow, axis, "m", options, lambda *at: None)
-        for _ in range(2)
+        Collector(orbit.problem.flow, axis, "m", options, lambda *at: None) for _ in range(2)
     )
     first.follow(orbit, 2, 2, None)
     again.take_back(first.branches, first.notes)
