@@ -204,15 +204,15 @@ def assemble_structure(model: StructureModel) -> StructureComponent:
     check_masses_carried(model)
     for text in unlikely(model):
         warnings.warn(text, UnlikelyWarning, stacklevel=3)
-    looked_at = boundary(model)
-    for text in locking_warnings(model, looked_at):
-        warnings.warn(text, LockingWarning, stacklevel=3)
     for text in distortion_warnings(model):
         warnings.warn(text, DistortionWarning, stacklevel=3)
     numbering = number_blocks(model)
     constraints = constrain(model, numbering)
     stiffness, mass = unconstrained_matrices(model, numbering)
+    looked_at = boundary(model)
     check_nothing_hangs(model, looked_at)
+    for text in locking_warnings(model, looked_at):
+        warnings.warn(text, LockingWarning, stacklevel=3)
     for text in overlap_warnings(model, looked_at):
         warnings.warn(text, JointWarning, stacklevel=3)
     K = constraints.reduced(stiffness)

@@ -94,7 +94,9 @@ def surface_through(places: FloatArray, normals: FloatArray, thickness: FloatArr
     >>> bool(abs(found.shape[0, 3] - 0.5 / 1.25**1.5) < 0.02)
     True
     """
-    first = places[:, 1] - places[:, 0]
+    ways = places - places[:, :1]
+    far = np.linalg.norm(ways, axis=2).argmax(axis=1)
+    first = ways[np.arange(len(far)), far]
     first = first - np.sum(first * normals, axis=1)[:, None] * normals
     first /= np.linalg.norm(first, axis=1)[:, None]
     axes = np.stack([first, np.cross(normals, first), normals], axis=1)

@@ -120,7 +120,7 @@ def own_cells(
     place = np.full(len(model.mesh.cells[name]), -1)
     place[model.mesh.part(piece.name)[name][piece.numbers]] = np.arange(len(piece.nodes))
     own = np.where(of_kind, place[np.where(of_kind, outer.numbers, 0)], -1)
-    at = evenly(own >= 0, count)
+    at = evenly((own >= 0) & outer.normals.any(axis=1), count)
     return at, own[at]
 
 
