@@ -756,7 +756,7 @@ def render(
         orbit = made.orbit
         drawn = (
             f"drawn: the {orbit.stability.verdict} orbit of period {orbit.period} at "
-            f"{orbit.frequency_hz:.6g} Hz, with {orbit.impacts} impacts"
+            f"{orbit.frequency_hz:.6g} Hz, with {orbit.impacts} impact{'s' * (orbit.impacts != 1)}"
         )
     return Told([drawn, written_by(work.out, "render")], made.missing, NO_GRAPHICS)
 

@@ -22,7 +22,9 @@ _off_circle = function("nldyn_off_circle", _WHOLE, _POINTER, result=_NUMBER)
 _meetings = function("nldyn_meetings", _WHOLE, _POINTER, _POINTER, *[_NUMBER] * 3, _WHOLE)
 _doubtful = function("nldyn_doubtful", _WHOLE, _WHOLE, _POINTER, _POINTER, _NUMBER, _POINTER)
 _dips = function(
-    "nldyn_dips_towards_circle", _WHOLE, _WHOLE, _POINTER, _POINTER, _POINTER, result=None
+    "nldyn_dips_towards_circle",
+    *(_WHOLE, _WHOLE, _POINTER, _POINTER, _POINTER, _POINTER),
+    result=None,
 )
 _return = function("nldyn_return_of_outside", _WHOLE, _WHOLE, _POINTER, _POINTER)
 
@@ -129,15 +131,16 @@ def doubtful(sigmas: Real, sets: Complex, error: float) -> int:
     )
 
 
-def dips_towards_circle(sets: Complex, errors: Real) -> NDArray[np.bool_]:
-    """Beside which sets (m, n) of multipliers one comes near the circle and goes again.
+def dips_towards_circle(sigmas: Real, sets: Complex, errors: Real) -> NDArray[np.bool_]:
+    """Beside which sets (m, n) of multipliers, at positions (m,), one nears the circle and goes.
 
-    That is where its distance is less than what a parabola may dip between three of them, and not
-    hidden by the error, (m,).
+    That is where its distance is less than what a parabola may dip between three of them, or the
+    parabola itself comes there on either side, and not hidden by the error, (m,).
     """
-    sets, errors = complexes(sets), reals(errors)
+    sigmas, sets, errors = reals(sigmas), complexes(sets), reals(errors)
     found = np.empty(len(sets), dtype=np.bool_)
-    _dips(*sets.shape, address_of(sets), address_of(errors), address_of(found))
+    given = map(address_of, (sigmas, sets, errors, found))
+    _dips(*sets.shape, *given)
     return found
 
 

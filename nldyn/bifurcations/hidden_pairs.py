@@ -110,7 +110,8 @@ class Between:
         sigmas = sorted(beside)
         sizes = np.array([error * max(bulge(sigma), 0.0) for sigma in sigmas])
         found: set[float] = set()
-        for i in np.flatnonzero(dips_towards_circle(np.array([beside[x] for x in sigmas]), sizes)):
+        sets = np.array([beside[x] for x in sigmas])
+        for i in np.flatnonzero(dips_towards_circle(np.array(sigmas), sets, sizes)):
             for low, high in ((sigmas[i - 1], sigmas[i]), (sigmas[i], sigmas[i + 1])):
                 if low >= 0.0 and high <= 1.0 and high - low > FINEST:
                     found.add(0.5 * (low + high))

@@ -188,11 +188,25 @@ EXPORT int64_t nldyn_doubtful(int64_t m, int64_t n, const double *sigmas, const 
     return found;
 }
 
-/* Beside which sets (m, n) of multipliers one comes near the circle and goes again: where its
- * distance is less than what a parabola may dip between three of them, and not hidden by the
- * error, (m,). */
-EXPORT void nldyn_dips_towards_circle(int64_t m, int64_t count, const Complex *sets,
-                                      const double *errors, bool *found)
+/* whether the parabola through three heights of one sign turns between them, and is nearer to zero
+ * there than half of each */
+static bool turns_near_zero(const double *x, double before, double here, double after)
+{
+    double rise = (here - before) / (x[1] - x[0]);
+    double bent = ((after - here) / (x[2] - x[1]) - rise) / (x[2] - x[0]);
+    if (!(bent * here > 0.0)) return false;
+    double slope = rise + bent * (x[1] - x[0]);
+    double way = -0.5 * slope / bent, top = here + 0.5 * slope * way;
+    if (!(x[0] - x[1] < way && way < x[2] - x[1])) return false;
+    double least = smaller(fabs(here), smaller(fabs(before), fabs(after)));
+    return (here > 0.0 ? top : -top) < 0.5 * least;
+}
+
+/* Beside which sets (m, n) of multipliers, at positions (m,), one comes near the circle and goes
+ * again: where its distance is less than what a parabola may dip between three of them, or the
+ * parabola itself comes there beside them, and not hidden by the error, (m,). */
+EXPORT void nldyn_dips_towards_circle(int64_t m, int64_t count, const double *sigmas,
+                                      const Complex *sets, const double *errors, bool *found)
 {
     int n = (int)count;
     for (int64_t k = 0; k < m; k++) found[k] = false;
@@ -205,8 +219,8 @@ EXPORT void nldyn_dips_towards_circle(int64_t m, int64_t count, const Complex *s
             double after = height_of(last[closest(n, last, set[i])]);
             if (!(before * here > 0.0 && here * after > 0.0)) continue;
             double least = smaller(fabs(before), fabs(after));
-            if (size <= least && size < 0.5 * (fabs(before) + fabs(after) - 2.0 * size))
-                found[k] = true;
+            bool dips = size <= least && size < 0.5 * (fabs(before) + fabs(after) - 2.0 * size);
+            if (dips || turns_near_zero(sigmas + k - 1, before, here, after)) found[k] = true;
         }
     }
 }

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from nldyn import ContinuationOptions, continue_branch, solve_orbit
+from nldyn.bifurcations.hidden_multipliers import dips_towards_circle
 from nldyn.bifurcations.hidden_pairs import Between
 
 PLACES = (-0.8, 0.0, 1.0, 1.9)
@@ -143,3 +144,14 @@ def test_pairs_at_the_circle_are_found_from_any_start(middle, range_hz, count, w
     assert len(expected) == count
     inside = [hz for hz in found(start, wide_hz, LONG) if range_hz[0] < hz < range_hz[1]]
     assert inside == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("roots", "near"), [((0.75, 0.87), True), ((0.6, 0.6001), True), ((1.5, 2.5), False)]
+)
+def test_a_multiplier_that_comes_to_the_circle_beside_the_middle_of_three_is_found(roots, near):
+    """Its ln|μ| is a parabola, whose roots are known: within the three sets or behind them."""
+    places = np.array([0.0, 0.5, 1.0])
+    heights = -0.01 * (places - roots[0]) * (places - roots[1])
+    sets = np.array([[np.exp(complex(h, 1.0)), np.exp(complex(h, -1.0))] for h in heights])
+    assert dips_towards_circle(places, sets, np.zeros(3)).tolist() == [False, near, False]
