@@ -22,6 +22,7 @@ from fem.model.sections import (
     CircularSection,
     SectionRun,
     TaperedSection,
+    added,
     section_number,
     shear_areas,
 )
@@ -111,13 +112,15 @@ def spatial_matrices(
 
     The degrees of freedom are (u, v, w) and the rotations about x, y and z at the first end, then
     at the second; x runs along the beam, y along the height of the section and z along its width.
-    Torsion is Saint-Venant's: GJ, and rho (Iy + Iz) as inertia; warping is free.
+    Torsion is Saint-Venant's: GJ, and rho (Iy + Iz) with the section's added inertia; warping is
+    free.
     """
     across = _bending(part, lengths, across_bending(part, what))
     signs = TURNED_SIGNS[:, None] * TURNED_SIGNS
     material, section = part.material, part.section
     torsion = shear_modulus(part, what) * section_number(section, "torsion_constant", what)
     polar = section.second_moment + section_number(section, "second_moment_across", what)
+    inertia = material.density * polar + added(section, "added_inertia")
     return _composed(
         12,
         [
@@ -126,9 +129,7 @@ def spatial_matrices(
             (OUT_OF_PLANE, (across[0] * signs, across[1] * signs)),
             (
                 np.array([3, 9]),
-                stretching_matrices(
-                    lengths, each(torsion, lengths), each(material.density * polar, lengths)
-                ),
+                stretching_matrices(lengths, each(torsion, lengths), each(inertia, lengths)),
             ),
         ],
     )
@@ -197,14 +198,21 @@ def bending_rows(
 
 
 def _stretching(part: BeamPart, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    material, area = part.material, each(part.section.area, lengths)
-    return stretching_matrices(lengths, material.youngs_modulus * area, material.density * area)
+    stiffness = part.material.youngs_modulus * part.section.area
+    return stretching_matrices(
+        lengths, each(stiffness, lengths), each(mass_per_length(part), lengths)
+    )
+
+
+def mass_per_length(part: BeamPart) -> Any:
+    """Density times area and what is added, in kg/m, at all places of a tapered part."""
+    return part.material.density * part.section.area + added(part.section, "added_mass")
 
 
 def _bending(
     part: BeamPart, lengths: FloatArray, numbers: Bending
 ) -> tuple[FloatArray, FloatArray]:
-    return numbers.matrices(lengths, part.material.density * part.section.area, part.axial_force)
+    return numbers.matrices(lengths, mass_per_length(part), part.axial_force)
 
 
 def _composed(

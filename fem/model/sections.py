@@ -49,6 +49,8 @@ class Section:
     shear_area, shear_area_across
         Area times shear coefficient in m², along the height and along the width; a Timoshenko
         beam needs them (the second only in space).
+    added_mass, added_inertia
+        What the beam carries beside its own mass, at its axis: kg/m, and kg m against twisting.
 
     Examples
     --------
@@ -62,9 +64,15 @@ class Section:
     torsion_constant: float | None = None
     shear_area: float | None = None
     shear_area_across: float | None = None
+    added_mass: float = 0.0
+    added_inertia: float = 0.0
 
     def __post_init__(self) -> None:
         check_positive("section", area=self.area, second_moment=self.second_moment)
+        for name in ("added_mass", "added_inertia"):
+            value = getattr(self, name)
+            if not (is_finite(value) and value >= 0.0):
+                raise ModelError(f"section: {name} must be finite and not negative, not {value!r}")
         names = ("second_moment_across", "torsion_constant", "shear_area", "shear_area_across")
         for name in names:
             if getattr(self, name) is not None:
@@ -316,6 +324,19 @@ class SectionRun:
         pairs = [section.shear_areas(poissons_ratio) for section in self.sections]
         first, second = np.array(pairs).T.reshape(2, *self.shares.shape)
         return first, second
+
+
+def added(section: Any, name: str) -> Any:
+    """The `added_mass` or `added_inertia` of a section, at its places if it is a run of them.
+
+    Examples
+    --------
+    >>> added(Section(1.0, 1.0, added_mass=3.0), "added_mass")
+    3.0
+    """
+    if isinstance(section, SectionRun):
+        return section.numbers(name) if isinstance(section.taper, LinearSection) else 0.0
+    return getattr(section, name, 0.0)
 
 
 def section_number(section: CrossSection, name: str, what: str) -> Any:

@@ -36,6 +36,7 @@ from fem.model.sections import (
     RectangularSection,
     Section,
     TaperedSection,
+    added,
 )
 from fem.model.structure import LISTS as STRUCTURE_LISTS
 from fem.model.structure import Part, StructureModel
@@ -276,6 +277,8 @@ def _plain_section(section: CrossSection, poissons_ratio: float | None) -> Secti
         getattr(section, "second_moment_across", None),
         getattr(section, "torsion_constant", None),
         *areas,
+        added(section, "added_mass"),
+        added(section, "added_inertia"),
     )
 
 

@@ -136,7 +136,6 @@ def _part(card: Card, numbers: BeamNumbers, law: Isotropic, lines: _Lines) -> Be
         nu, factor = 0.3, G * 2.6 / E
     start, angle = _section(card, numbers, 0, factor)
     end, _ = _section(card, numbers, 1, factor)
-    density = law.density + 2.0 * float(np.mean(numbers.added)) / (start.area + end.area)
     sheared = any(numbers.shear) and G > 0.0
     heights, offsets = [], []
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
@@ -145,7 +144,7 @@ def _part(card: Card, numbers: BeamNumbers, law: Isotropic, lines: _Lines) -> Be
         heights.append(turn[0] @ np.stack([y, z]))
         offsets.append(w)
     return BeamPart(
-        Material(E, density, nu),
+        Material(E, law.density, nu),
         start if start == end else LinearSection(start, end),
         "timoshenko" if sheared else "euler-bernoulli",
         orientation=_once(np.array(heights)),
@@ -173,7 +172,8 @@ def _section(card: Card, numbers: BeamNumbers, end: int, factor: float) -> tuple
     areas: list[float | None] = [None, None]
     if any(numbers.shear) and factor:
         areas = [factor * area * (k or RIGID) for k in numbers.shear]
-    return Section(area, first, second, torsion, *areas), angle
+    added = numbers.added[end], numbers.inertia[end]
+    return Section(area, first, second, torsion, *areas, *added), angle
 
 
 def _once(values: FloatArray) -> Any:

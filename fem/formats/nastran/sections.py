@@ -11,6 +11,7 @@ from fem.formats.nastran.shapes import SHAPES, Numbers
 
 End = tuple[float, float, float, float, float]
 """Area, I1, I2, I12 and J."""
+NSM_PLACE = "its mass is taken at the neutral axis"
 STATIONS = ("YES", "YESA", "NO")
 SHEAR_OF = {"BAR": (5 / 6, 5 / 6), "ROD": (0.9, 0.9), "TUBE": (0.5, 0.5), "TUBE2": (0.5, 0.5)}
 """Shear factors of shapes for which they are the same in both planes."""
@@ -26,6 +27,8 @@ class BeamNumbers:
         At the first and the second end.
     added
         Non-structural mass in kg/m at both ends.
+    inertia
+        Non-structural inertia against twisting in kg m at both ends.
     shear
         Shear factors in plane 1 and 2; 0 without shear deformation.
     axis
@@ -36,6 +39,7 @@ class BeamNumbers:
     added: tuple[float, float]
     shear: tuple[float, float] = (0.0, 0.0)
     axis: tuple[tuple[float, float], tuple[float, float]] = ((0.0, 0.0), (0.0, 0.0))
+    inertia: tuple[float, float] = (0.0, 0.0)
 
 
 def beam_numbers(deck: Deck, card: Card, mass_factor: float) -> BeamNumbers:
@@ -94,6 +98,8 @@ def _pbeaml(deck: Deck, card: Card, mass_factor: float) -> BeamNumbers:
     last, mass = ends[-1], (mass_factor * added[0], mass_factor * added[-1])
     axis = [(-n.shear_centre[0], -n.shear_centre[1]) for n in (first, last)]
     _tell_of_axis(deck, card, axis)
+    if any(mass) and any(map(any, axis)):
+        deck.leave_out("place of NSM of PBEAML", card.place, NSM_PLACE)
     return BeamNumbers((_end(first), _end(last)), mass, (1.0, 1.0), (axis[0], axis[1]))
 
 
@@ -115,18 +121,22 @@ def _pbeam(deck: Deck, card: Card, mass_factor: float) -> BeamNumbers:
         deck.leave_out("warping of PBEAM", card.place, "beams warp freely")
     if any(card.real(8 * row + i) for i in (2, 3)):
         deck.leave_out("shear relief of PBEAM", card.place, "shear is that of a straight beam")
-    if any(card.real(8 * row + i) for i in (4, 5)):
-        deck.leave_out("inertia NSI of PBEAM", card.place, "give it as CONM2 where it matters")
-    axis = [(card.real(8 * row + at), card.real(8 * row + at + 1)) for at in (12, 14)]
-    if not (card.text(8 * row + 14) or card.text(8 * row + 15)):
-        axis[1] = axis[0]
+    turning = card.real(8 * row + 4), card.real(8 * row + 5, card.real(8 * row + 4))
+    place, axis = _places(card, 8 * row + 8), _places(card, 8 * row + 12)
     _tell_of_axis(deck, card, axis)
-    if any(card.real(8 * row + at) for at in (8, 9, 10, 11)):
-        deck.leave_out("place of NSM of PBEAM", card.place, "its mass is taken at the axis")
+    if (start[5] or ends[-1][5] or any(turning)) and place != axis:
+        deck.leave_out("place of NSM of PBEAM", card.place, NSM_PLACE)
     last = ends[-1]
     made = [(e[0], e[1], e[2], e[3], e[4]) for e in (start, last)]
     added = (mass_factor * start[5], mass_factor * last[5])
-    return BeamNumbers((made[0], made[1]), added, shear, (axis[0], axis[1]))
+    inertia = (mass_factor * turning[0], mass_factor * turning[1])
+    return BeamNumbers((made[0], made[1]), added, shear, (axis[0], axis[1]), inertia)
+
+
+def _places(card: Card, at: int) -> list[tuple[float, float]]:
+    """Places (y, z) at both ends; a blank one of the second end is that of the first."""
+    first = card.real(at), card.real(at + 1)
+    return [first, (card.real(at + 2, first[0]), card.real(at + 3, first[1]))]
 
 
 def _tell_of_stations(deck: Deck, card: Card) -> None:

@@ -86,6 +86,35 @@ def test_a_tapered_beam_carries_its_mean_mass(tmp_path):
     assert found.rigid_mass[0, 0] == pytest.approx(8000.0 * 2e-4 + 0.2)
 
 
+@pytest.mark.parametrize(
+    ("rest", "moment", "polar"),
+    [
+        ("10.\n,,,,,,,,\n,NO,1.,1.-3,4.-6,1.-7,,2.-7,0.\n", 8.0 / 2 + 10.0 / 6, 8000 * 4.1e-6),
+        ("10.\n,,,,,,,,\n,NO,1.,3.-3,4.-6,1.-7,,2.-7,10.\n", 8.0 * (1 / 2 + 2 / 3) + 5.0,
+         8000 * 4.1e-6),
+        ("10.\n", 9.0, 8000 * 4.1e-6),
+        ("10.\n,,,,,,,,\n,,,,,.02,.04\n", 9.0, 8000 * 4.1e-6 + 0.03),
+    ],
+)  # fmt: skip
+def test_added_mass_is_linear_whatever_the_area_and_turns_only_as_told(
+    tmp_path, rest, moment, polar
+):
+    """The first moment is the integral of (rho A + NSM) x; NSI alone adds to rho (I1 + I2)."""
+    prop = f"PBEAM,7,1,1.-3,4.-6,1.-7,,2.-7,{rest}"
+    found = component(tmp_path, cantilever("CBEAM", prop, 1)).rigid_mass
+    assert found[1, 5] == pytest.approx(moment, rel=1e-12)
+    assert found[3, 3] == pytest.approx(polar, rel=1e-12)
+
+
+def test_a_place_of_added_mass_aside_of_the_neutral_axis_is_told(tmp_path):
+    path = tmp_path / "deck.bdf"
+    for last, told in (("0.,0.,0.,0.,.1,.2", 1), ("0.,0.,0.,0.", 0), (".1,.2,.1,.2,.1,.2", 0)):
+        prop = f"PBEAM,7,1,1.-3,4.-6,1.-7,,2.-7,1.\n,,,,,,,,\n,,,,,,,,\n,{last}\n"
+        path.write_text(f"{HEAD}{cantilever('CBEAM', prop, 1)}ENDDATA\n")
+        names = [item.keyword for item in fem.read_structure(path).left_out]
+        assert names.count("place of NSM of PBEAM") == told
+
+
 def test_rods_stretch_and_twist(tmp_path):
     """A truss of CROD, CONROD and CTUBE that are alike, and torsion between beams."""
     area = np.pi / 4 * (0.02**2 - 0.01**2)
@@ -177,7 +206,7 @@ def test_pbarl_and_pbeaml_are_their_shapes(tmp_path):
     bar = component(tmp_path, cantilever("CBAR", "PBARL,7,1,,BAR\n,.02,.05,.3\n"))
     part = bar.model.parts["PBARL 7"]
     assert part.section.second_moment == pytest.approx(0.02 * 0.05**3 / 12)
-    assert part.material.density == pytest.approx(8000.0 + 0.3 / 0.001)
+    assert part.material.density == 8000.0 and part.section.added_mass == 0.3
     cards = cantilever("CBEAM", "PBEAML,7,1,,CHAN\n,.05,.1,.006,.008,,YES,1.,.05\n,.1,.006,.008\n")
     beam = component(tmp_path, cards).model.parts["PBEAML 7"]
     aside = SHAPES["CHAN"][1](0.05, 0.1, 0.006, 0.008).shear_centre[1]
