@@ -7,14 +7,16 @@ What bears on stiffness, mass and connection is read; what is left out by intent
 from __future__ import annotations
 
 from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
 
 from fem.base.errors import ModelError
 from fem.formats.deck_file import DeckFile
 from fem.formats.nastran.beams import read_beams
+from fem.formats.nastran.cards import Card
 from fem.formats.nastran.deck import Deck, read_deck
 from fem.formats.nastran.gathered import Gathered
-from fem.formats.nastran.known import PARAMETERS_WITH_EFFECT
+from fem.formats.nastran.known import PARAMETERS, PARAMETERS_WITH_EFFECT
 from fem.formats.nastran.materials import Materials
 from fem.formats.nastran.matrices import read_matrices
 from fem.formats.nastran.points import read_points
@@ -102,22 +104,41 @@ def read_nastran(
 
 def _parameters(deck: Deck) -> float:
     """The factor on all masses; a PARAM that changes matrices otherwise is refused."""
+    taken: dict[str, Card] = {}
     for card in deck.of("PARAM"):
         name = card.text(0)
-        if name in PARAMETERS_WITH_EFFECT - {"WTMASS", "AUTOSPC"} and card.real(1) != 1.0:
-            raise card.fail(f"{name} scales a part of the matrices, which is not read")
         if name not in PARAMETERS_WITH_EFFECT:
-            deck.leave_out("PARAM", card.place, "it changes no matrix of this model")
+            _leave_out_parameter(deck, card, name)
+            continue
+        before = taken.setdefault(name, card)
+        if before.text(1) != card.text(1):
+            raise card.fail(f"{name} is {before.text(1)} already, in {before.place}; keep one")
+        if name == "AUTOSPC":
+            continue
+        card.check_fields("xxx")
         if name == "WTMASS" and not card.real(1) > 0.0:
             raise card.fail(f"WTMASS is {card.real(1):g} and must be positive")
-    return deck.parameter("WTMASS", 1.0)
+        if name != "WTMASS" and card.real(1) != 1.0:
+            raise card.fail(f"{name} scales a part of the matrices, which is not read")
+    return taken["WTMASS"].real(1) if "WTMASS" in taken else 1.0
+
+
+def _leave_out_parameter(deck: Deck, card: Card, name: str) -> None:
+    if name == "COUPMASS":
+        deck.leave_out("PARAM COUPMASS", card.place, "masses are consistent here, always")
+    elif name in PARAMETERS or name.startswith("PRT"):
+        deck.leave_out("PARAM", card.place, "it changes no matrix of this model")
+    else:
+        like = get_close_matches(name, PARAMETERS | PARAMETERS_WITH_EFFECT, 1, 0.8)
+        reason = "no parameter of this name is known" + (f"; is it {like[0]}?" if like else "")
+        deck.leave_out(f"PARAM {name}", card.place, reason)
 
 
 def _name_analysis_set(gathered: Gathered) -> None:
     """The grid points of ASET and ASET1 as a set of points, for the scene to choose from."""
     grids: list[int] = []
     for card in gathered.deck.of("ASET"):
-        grids += [card.whole(at) for at in range(0, len(card.fields), 2) if card.text(at)]
+        grids += [card.whole(at) for at in range(0, len(card.fields), 2) if card.given(at, 2)]
     for card in gathered.deck.of("ASET1"):
         grids += card.wholes(1)
     known = [g for g in dict.fromkeys(grids) if g in gathered.deck.grids]

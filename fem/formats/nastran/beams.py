@@ -169,9 +169,10 @@ def _section(card: Card, numbers: BeamNumbers, end: int, factor: float) -> tuple
     wrong = [name for name, value in named.items() if not value > 0.0]
     if wrong:
         raise card.fail(f"its {' and '.join(wrong)} must be positive for a beam; write it as CROD")
-    areas: list[float | None] = [None, None]
+    areas: tuple[float | None, float | None] = (None, None)
     if any(numbers.shear) and factor:
-        areas = [factor * area * (k or RIGID) for k in numbers.shear]
+        up, across = (factor * area * (k or RIGID) for k in numbers.shear)
+        areas = up, across
     added = numbers.added[end], numbers.inertia[end]
     return Section(area, first, second, torsion, *areas, *added), angle
 

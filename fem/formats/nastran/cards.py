@@ -64,6 +64,11 @@ class Card:
         """An error that names the file, the line and the card."""
         return ModelError(f"{self.source}: {self.place}: {self.name}: {text}")
 
+    def field(self, at: int) -> str:
+        """How a field is called: "field 3", or "field 3 of its line 2"."""
+        line, place = divmod(at, 8)
+        return f"field {place + 2}" + (f" of its line {line + 1}" if line else "")
+
     def text(self, at: int) -> str:
         """A field in capitals; an empty text where there is none."""
         return self.fields[at].upper() if at < len(self.fields) else ""
@@ -78,17 +83,25 @@ class Card:
         if not word and default is not None:
             return default
         if not WHOLE.fullmatch(word):
-            raise self.fail(f"{word!r} in field {at + 2} is not a whole number")
+            raise self.fail(f"{word!r} in {self.field(at)} is not a whole number")
         return int(word)
 
     def real(self, at: int, default: float | None = 0.0) -> float:
-        """A real number, whose exponent may lack its letter; a blank field is the default."""
+        """A real number, whose exponent may lack its letter; a blank field is the default.
+
+        A number without point and exponent is a whole one, which Nastran does not take for a real.
+        """
         word = self.text(at)
         if not word and default is not None:
             return default
+        if WHOLE.fullmatch(word):
+            raise self.fail(
+                f"{word!r} in {self.field(at)} is a whole number where a real one belongs; write"
+                f" '{word}.'"
+            )
         found = REAL.fullmatch(word)
         if found is None:
-            raise self.fail(f"{word!r} in field {at + 2} is not a real number")
+            raise self.fail(f"{word!r} in {self.field(at)} is not a real number")
         exponent = (found[2] or found[3] or "0").replace(" ", "")
         return float(f"{found[1]}e{exponent}")
 
@@ -127,11 +140,41 @@ class Card:
             raise self.fail(f"{word!r} is not a whole number")
         return int(word)
 
+    def given(self, at: int, size: int) -> bool:
+        """Whether a group of fields holds anything; then it needs the first of them."""
+        more = [i for i in range(at, at + size) if self.text(i)]
+        if more and more[0] != at:
+            raise self.fail(
+                f"has {self.text(more[0])!r} in {self.field(more[0])}, but nothing in"
+                f" {self.field(at)}, which goes with it"
+            )
+        return bool(more)
+
+    def check_fields(self, lines: str) -> None:
+        """Refuse what stands in fields that must be blank (-) and behind the last one.
+
+        Parameters
+        ----------
+        lines
+            As in `known.FIELDS`, such as "xxxxxxx- *-xxxxxx-".
+        """
+        first, _, further = lines.partition(" *")
+        known = first.replace(" ", "") + further * (len(self.fields) // 8)
+        for at, word in enumerate(self.fields):
+            if word in ("", "+") or known[at : at + 1] == "x":
+                continue
+            if at < len(known):
+                raise self.fail(f"has {word!r} in {self.field(at)}, which must be blank")
+            raise self.fail(
+                f"has {word!r} in {self.field(at)}, behind its last one; an element or a point"
+                " needs a card of its own"
+            )
+
     def components(self, at: int) -> list[int]:
         """Directions out of 1 to 6, such as "1346"."""
         word = self.text(at).replace(" ", "")
         if not re.fullmatch(r"[1-6]+", word):
-            raise self.fail(f"{word!r} in field {at + 2} are not directions out of 1 to 6")
+            raise self.fail(f"{word!r} in {self.field(at)} are not directions out of 1 to 6")
         return [int(digit) for digit in dict.fromkeys(word)]
 
 

@@ -126,13 +126,6 @@ class Deck:
             )
         return found[0] if found else None
 
-    def parameter(self, name: str, default: float) -> float:
-        """The number of a ``PARAM``."""
-        for card in self.of("PARAM"):
-            if card.text(0) == name:
-                return card.real(1)
-        return default
-
     def place(self, number: int, card: Card) -> FloatArray:
         """Basic coordinates of a grid point that a card names."""
         if number in self.places:
@@ -174,7 +167,8 @@ def read_deck(path: Path, folders: Sequence[Path], ignore: Iterable[str]) -> Dec
             deck.ignored.add(card.name)
             deck.leave_out(card.name, card.place, "it is to be ignored")
         elif card.name in READ:
-            _check_end(card)
+            if card.name in FIELDS:
+                card.check_fields(FIELDS[card.name])
             deck.cards.setdefault(card.name, []).append(card)
         elif card.name in LEFT_OUT:
             deck.leave_out(card.name, card.place, LEFT_OUT[card.name])
@@ -186,22 +180,11 @@ def read_deck(path: Path, folders: Sequence[Path], ignore: Iterable[str]) -> Dec
     return deck
 
 
-def _check_end(card: Card) -> None:
-    """Raise ModelError where fields stand behind the last one of a card."""
-    most = FIELDS.get(card.name, len(card.fields))
-    more = [at for at in range(most, len(card.fields)) if card.fields[at] not in ("", "+")]
-    if more:
-        raise card.fail(
-            f"has {card.fields[more[0]]!r} in field {more[0] + 2}, behind its last one; an element"
-            " or a point needs a card of its own"
-        )
-
-
 def _read_systems(deck: Deck) -> None:
     given: dict[int, tuple[Card, int]] = {}
     for card in deck.of(*SYSTEM_CARDS):
         by_numbers = SYSTEM_CARDS[card.name][0] == 2
-        starts = [(0, 1)] if by_numbers or not card.text(4) else [(0, 1), (4, 5)]
+        starts = [(0, 1)] if by_numbers or not card.given(4, 4) else [(0, 1), (4, 5)]
         for at, first in starts:
             number = card.whole(at)
             if number in given and given[number][0].fields != card.fields:

@@ -16,6 +16,9 @@ from fem.formats.nastran.gathered import Gathered
 CHOICES = {"K2GG": "stiffness", "M2GG": "mass", "B2GG": "damping"}
 IN_RESPONSES = ("K2PP", "M2PP", "B2PP")
 SYMMETRIC, SQUARE = 6, 1
+REAL = (1, 2)
+BEGUN, COLUMN = "xxxxxx-x", "xxx-xxxx *xxxxxxxx"
+"""Fields of the card that begins a matrix and of those of its columns, as in `known.FIELDS`."""
 MOST = 3000
 """Rows of a matrix that is kept whole."""
 Entry = tuple[int, int]
@@ -75,6 +78,7 @@ def _all(cards: list[Card]) -> dict[str, _Matrix]:
     for card in cards:
         name = card.text(0)
         if card.text(1) == "0":
+            card.check_fields(BEGUN)
             found[name] = _Matrix(card)
         elif name not in found:
             raise card.fail(f"the matrix {name} is not begun (DMIG,{name},0,...)")
@@ -84,9 +88,15 @@ def _all(cards: list[Card]) -> dict[str, _Matrix]:
 
 
 def _column(card: Card, matrix: _Matrix) -> None:
+    card.check_fields(COLUMN)
     column = card.whole(1), card.whole(2, 0)
     for at in range(4, len(card.fields), 4):
-        if card.text(at):
+        if card.given(at, 4):
+            if card.text(at + 3) and matrix.card.whole(3) in REAL:
+                raise card.fail(
+                    f"has {card.text(at + 3)!r} in {card.field(at + 3)}, an imaginary part, but"
+                    f" {card.text(0)} is real"
+                )
             row, value = (card.whole(at), card.whole(at + 1, 0)), card.real(at + 2)
             if matrix.values.setdefault((row, column), value) != value:
                 raise card.fail(f"the number of row {row} and column {column} stands twice")
@@ -96,7 +106,7 @@ def _column(card: Card, matrix: _Matrix) -> None:
 
 def _add(gathered: Gathered, kind: str, name: str, matrix: _Matrix, factor: float) -> None:
     card = matrix.card
-    if card.whole(2) not in (SYMMETRIC, SQUARE) or card.whole(3) not in (1, 2):
+    if card.whole(2) not in (SYMMETRIC, SQUARE) or card.whole(3) not in REAL:
         raise card.fail("must be symmetric (6) or square (1) and real (1 or 2)")
     entries = sorted({entry for pair in matrix.values for entry in pair})
     if len(entries) > MOST:

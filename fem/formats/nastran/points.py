@@ -42,10 +42,10 @@ def read_points(gathered: Gathered, mass_factor: float) -> None:
 def _properties(gathered: Gathered, name: str) -> Property:
     """Where the number of each property stands; a card may hold several."""
     found: dict[int, tuple[Card, int]] = {}
-    steps = (0, 4) if name == "PELAS" else (0, 2, 4, 6)
+    size = 4 if name == "PELAS" else 2
     for card in gathered.deck.of(name):
-        for at in steps:
-            if card.text(at):
+        for at in range(0, 8, size):
+            if card.given(at, size):
                 number = card.whole(at)
                 if number in found and found[number][0].fields != card.fields:
                     raise card.fail(f"{number} is defined twice")
@@ -225,7 +225,7 @@ def _bush_numbers(deck: Deck, card: Card) -> dict[str, FloatArray]:
         elif not word:
             at += 1
         else:
-            raise card.fail(f"{word!r} in field {at + 2} is not read")
+            raise card.fail(f"{word!r} in {card.field(at)} is not read")
     return found
 
 
@@ -273,7 +273,7 @@ def _read_viscous(gathered: Gathered, card: Card) -> None:
     owners = {}
     for own in gathered.deck.of("PVISC"):
         for at in (0, 4):
-            if own.text(at):
+            if own.given(at, 4):
                 owners[own.whole(at)] = (own, at + 1)
     number = card.whole(1, card.whole(0))
     if number not in owners:

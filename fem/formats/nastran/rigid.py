@@ -239,7 +239,7 @@ def _forms(gathered: Gathered, card: Card) -> list[tuple[int, int, float]]:
     found = []
     for start in range(0, len(card.fields), 8):
         for at in (start + 1, start + 4):
-            if card.text(at):
+            if card.given(at, 3):
                 grid, value = card.whole(at), card.real(at + 2)
                 component = 1 if grid in gathered.deck.scalars else card.components(at + 1)[0]
                 found.append((grid, component, value))

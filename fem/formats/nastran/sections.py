@@ -77,6 +77,7 @@ def _end(numbers: Numbers) -> End:
 def _pbarl(deck: Deck, card: Card, mass_factor: float) -> BeamNumbers:
     count, shape = _shape(card)
     end = _end(_shaped(card, shape, 8))
+    card.check_fields("x" * (9 + count))
     added = mass_factor * card.real(8 + count)
     return BeamNumbers((end, end), (added, added), SHEAR_OF.get(shape, (0.0, 0.0)))
 
@@ -126,6 +127,7 @@ def _pbeam(deck: Deck, card: Card, mass_factor: float) -> BeamNumbers:
     _tell_of_axis(deck, card, axis)
     if (start[5] or ends[-1][5] or any(turning)) and place != axis:
         deck.leave_out("place of NSM of PBEAM", card.place, NSM_PLACE)
+    card.check_fields("x" * (8 * row + 16))
     last = ends[-1]
     made = [(e[0], e[1], e[2], e[3], e[4]) for e in (start, last)]
     added = (mass_factor * start[5], mass_factor * last[5])

@@ -120,7 +120,7 @@ def read_shells(gathered: Gathered, materials: Materials) -> None:
 
 def _grid(card: Card, at: int) -> int:
     if not card.text(at):
-        raise card.fail(f"has no grid point in field {at + 2}; give all middle nodes or none")
+        raise card.fail(f"has no grid point in {card.field(at)}; give all middle nodes or none")
     return card.whole(at)
 
 

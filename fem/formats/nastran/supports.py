@@ -94,7 +94,7 @@ def _given(deck: Deck, sets: frozenset[int]) -> Iterator[tuple[Card, int, set[in
         if card.whole(0) not in sets:
             continue
         for at in (1, 4):
-            if card.text(at):
+            if card.given(at, 3):
                 number = card.whole(at)
                 if card.real(at + 2):
                     deck.leave_out("enforced motion of SPC", card.place, "loads are of the scene")

@@ -93,6 +93,9 @@ BRICK = bulk(fem.box_mesh("body", (1.0, 1.0, 1.0), (1, 1, 1), kind="hexahedron")
          "brick.bdf line 5: INCLUDE: the file .*more.bdf does not"),
         ("PARAM", "NOTHING,1\nPARAM", r"NOTHING \(1, first in line 5\): it is neither read nor"),
         ("PARAM", "PARAM,CM2,2.\nPARAM", "line 5: PARAM: CM2 scales a part of the matrices"),
+        ("PARAM", "PARAM,CB1,2.\nPARAM", "line 5: PARAM: CB1 scales a part of the matrices"),
+        ("PARAM", "PARAM,WTMASS,1.\nPARAM,WTMASS,.25\nPARAM",
+         "line 6: PARAM: WTMASS is 1. already, in line 5; keep one"),
         ("GRID,1,,", "GRID,1,4,", "line 10: GRID: names the coordinate system 4, which is not"),
         ("GRID,1,,", "GRID*   1\nGRID,1,,", "line 10: GRID: has no third coordinate"),
         ("GRID,2,", "GRID,1,", "line 11: GRID: grid point 1 is defined twice"),
@@ -126,6 +129,17 @@ def test_cards_of_analyses_and_unused_systems_change_nothing(tmp_path):
     assert [str(item) for item in found.left_out][:2] == [
         "NLPARM (1, first in line 5): which analysis is made is told by the scene",
         "TABDMP1 (1, first in line 6): which analysis is made is told by the scene",
+    ]
+
+
+def test_parameters_that_nobody_knows_are_named(tmp_path):
+    path = tmp_path / "brick.bdf"
+    path.write_text(BRICK.replace("PARAM", "PARAM,WTMAS,.25\nPARAM,XQZ,1\nPARAM,COUPMASS,1\nPARAM"))
+    assert [str(item) for item in fem.read_structure(path).left_out][:4] == [
+        "PARAM WTMAS (1, first in line 5): no parameter of this name is known; is it WTMASS?",
+        "PARAM XQZ (1, first in line 6): no parameter of this name is known",
+        "PARAM COUPMASS (1, first in line 7): masses are consistent here, always",
+        "PARAM (1, first in line 8): it changes no matrix of this model",
     ]
 
 

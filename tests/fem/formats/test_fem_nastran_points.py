@@ -96,6 +96,39 @@ def test_faults_name_card_line_and_what_is_wrong(tmp_path, more, said):
         read(tmp_path, more)
 
 
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ("CONM2,51,1,,3.,.1,.2,.3,.5\n,.05\n", "CONM2: has '.5' in field 9, which must be blank"),
+        ("MPC,8,1,2,1.,2,2,-1.,5\n,,3,2,.5\n", "MPC: has '5' in field 9, which must be blank"),
+        ("MPC,8,1,2,1.,2,2,-1.\n,3,2,.5\n", "MPC: has '3' in field 2 of its line 2, which must"),
+        ("MPC,8,1,2,1.,,2,-1.\n", "MPC: has '2' in field 7, but nothing in field 6"),
+        ("PBAR,1,1,1.-3,4.-7,1.-7,2.-7,.5,7.\n", "PBAR: has '7.' in field 9, which must be"),
+        ("PBARL,1,1,,ROD,,,,.1\n,.2\n", "PBARL: has '.1' in field 9, which must be blank"),
+        ("CTRIA3,9,1,1,2,3,,,.1\n", "CTRIA3: has '.1' in field 9, which must be blank"),
+        ("MAT1,9,2.+11,,.3,,,,\n,,,,,7.\n", "MAT1: has '7.' in field 6 of its line 2, behind"),
+        ("RBE3,9,7,1,123456,1.,123,2,3\n", "RBE3: has '7' in field 3, which must be blank"),
+        ("SPC,1,,12,0.\n", "SPC: has '12' in field 4, but nothing in field 3, which goes with it"),
+        ("PVISC,4,2.,,9\n", "PVISC: has '9' in field 5, which must be blank"),
+        ("DMIG,A,0,6,1\nDMIG,A,1,1,,1,1,2.\n,,1,2,3.\n", "DMIG: has '1' in field 3 of its line"),
+        ("DMIG,A,0,6,1\nDMIG,A,1,1,,1,1,2.,3.\n", "DMIG: has '3.' in field 9, an imaginary part"),
+        ("MAT1,1,30,+6,,.3\n", "MAT1: '30' in field 3 is a whole number where .*; write '30.'"),
+        ("CELAS2,9,100,1,1\n", "CELAS2: '100' in field 3 is a whole number where .*write '100.'"),
+        ("CONM2,9,1,,1.\n,.5,0,.5\n", "CONM2: '0' in field 3 of its line 2 is a whole number"),
+    ],
+)  # fmt: skip
+def test_what_stands_where_a_card_has_no_field_is_refused_and_so_are_whole_numbers_for_reals(
+    tmp_path, more, said
+):
+    """The fields are those of the quick reference guide, in which reals have a point."""
+    text = BRICK.replace("MAT1,1,2.+11,,.3,8000.\n", "") if "MAT1,1," in more else BRICK
+    path = tmp_path / "deck.bdf"
+    case = "SPC = 1\nMPC = 8" if "MPC," in more else "SPC = 1"
+    path.write_text(f"SOL 103\nCEND\n{case}\nBEGIN BULK\n{text}{more}SPC1,1,3,1\nENDDATA\n")
+    with pytest.raises(fem.ModelError, match=said):
+        fem.parts_of(fem.read_structure(path))
+
+
 def test_an_equation_needs_a_first_factor(tmp_path):
     with pytest.raises(fem.ModelError, match="line 17: MPC: its first factor is 0"):
         read(tmp_path, "MPC,1,1,1,0.,2,1,1.\n", "MPC = 1")
@@ -305,7 +338,7 @@ def test_supports_alone_do_not_forbid_another_unit(tmp_path):
     assert mesh.attachments and not mesh.attachments.measured
 
 
-PUNCHED = """DMIG    KSPR           0       6       2       0               2
+PUNCHED = """DMIG    KSPR           0       6       2       0                       2
 DMIG*   KSPR                          20               1
 *                     20               1 8.000000000D+00
 DMIG*   KSPR                          20               2
