@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from nldyn.search.diagram import Diagram
     from nldyn.system.friction import Slider
     from nldyn.system.rigid_stop import AnyStop
+    from nldyn.system.round_stop import RoundStop
     from nldyn.system.system import AnySpring, System
 
 
@@ -103,12 +104,15 @@ def describe_stop(stop: AnyStop, length: str = "m") -> str:
     """Say in a line where a stop is and what it does; of a rotation the length is rad."""
     from nldyn.system.naming import moment_unit
     from nldyn.system.rigid_stop import RigidStop
+    from nldyn.system.round_stop import RoundStop
 
     if isinstance(stop, RigidStop):
         return (
             f"rigid stop {_place(stop)}: restitution {stop.restitution_at(1.0):g}, "
             f"gap {stop.gap:g} {length}, direction {stop.direction:+d}"
         )
+    if isinstance(stop, RoundStop):
+        return _describe_round(stop)
     force = moment_unit(length)
     unit = f"{force}/{length}" + ("" if stop.exponent == 1.0 else f"^{stop.exponent:g}")
     loss = f", dissipation {stop.dissipation:g} s/{length}" if stop.dissipation else ""
@@ -118,6 +122,22 @@ def describe_stop(stop: AnyStop, length: str = "m") -> str:
         f"stop {_place(stop)}: {stop.stiffness:.6g} {unit}, gap {stop.gap:g} {length}, "
         f"direction {stop.direction:+d}{loss}"
     )
+
+
+def _describe_round(stop: RoundStop) -> str:
+    """Say in a line where a round clearance is and what it does."""
+    from nldyn.system.naming import quoted
+
+    unit = "N/m" + ("" if stop.exponent == 1.0 else f"^{stop.exponent:g}")
+    told = f"{'ring around' if stop.inside else 'pin beside'} {quoted(stop.plane)}"
+    told += f" against {quoted(stop.against_plane)}" if stop.against_plane else ""
+    told += f": {stop.stiffness:.6g} {unit}, clearance {stop.clearance:g} m"
+    x, y = stop.eccentricity
+    told += "" if stop.concentric else f", centre at {x:g}, {y:g} m"
+    told += f", dissipation {stop.dissipation:g} s/m" if stop.dissipation else ""
+    if not stop.friction:
+        return told
+    return f"{told}, friction {stop.friction:g} of a surface at {stop.surface_speed:g} m/s"
 
 
 def describe_spring(spring: AnySpring, length: str = "m") -> str:

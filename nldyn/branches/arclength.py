@@ -129,6 +129,17 @@ def grazing_between(a: Orbit, b: Orbit) -> bool:
     return first != last
 
 
+def rubs_all_around(orbit: Orbit) -> bool:
+    """Whether a round clearance is closed all the time, which no impact tells.
+
+    Where that begins, all of a circular whirl touches at once, and its branch has a corner.
+    """
+    if orbit.impacts or not orbit.system.round_stops:
+        return False
+    depth = orbit.trajectory.contacts_at_nodes[0]
+    return bool(depth[:, list(orbit.system.round_stops)].any())
+
+
 def _past_impact_at_node(
     here: BranchNode, steps: Sequence[float], near: float, max_angle: float
 ) -> tuple[BranchNode, float, float] | None:
@@ -410,7 +421,11 @@ class Stepper:
         if step <= KINK and miss < 1.0:
             if orbit.impacts != here.orbit.impacts and grazes_rigid(here.orbit, -GRAZES, GRAZES):
                 return None  # the branch with the impact and that without meet in a corner
-            if orbit.system.jumps or orbit.impacts != here.orbit.impacts:
+            if (
+                orbit.system.jumps
+                or orbit.impacts != here.orbit.impacts
+                or rubs_all_around(orbit) != rubs_all_around(here.orbit)
+            ):
                 tangent = found.tangent(direction)
                 return BranchNode.of(found, tangent, here.arclength + step), 0.0, 0.0
         if miss > self.options.max_miss:

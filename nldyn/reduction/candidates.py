@@ -12,6 +12,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
 from nldyn.reduction.load_case import LoadCase
 from nldyn.system.contact_law import duration_factor
+from nldyn.system.round_stop import RoundStop
 from nldyn.system.stop import Stop
 from nldyn.system.system import AnyDamper, AnySpring, System
 
@@ -87,7 +88,7 @@ def candidate_modes(component: cms.ComponentLike, setting: LoadCase) -> Candidat
     return Candidates(whole, seen, cutoff, contact)
 
 
-def contact_duration(stop: Stop, mass: float, speed: float) -> float:
+def contact_duration(stop: Stop | RoundStop, mass: float, speed: float) -> float:
     r"""Duration in s of the impact of a free mass on a stop without loss.
 
     .. math:: T = \frac{2\delta}{v}\int_0^1\frac{dx}{\sqrt{1 - x^{p+1}}}, \qquad
@@ -118,7 +119,7 @@ def contact_duration(stop: Stop, mass: float, speed: float) -> float:
 
 def in_use(model: cms.ReducedModel, setting: LoadCase) -> Real:
     """Participations (m, r) of the interfaces where something acts or is observed."""
-    pairs: tuple[Stop | AnyDamper | AnySpring, ...] = (
+    pairs: tuple[Stop | RoundStop | AnyDamper | AnySpring, ...] = (
         *setting.stops,
         *setting.dampers,
         *setting.springs,
@@ -126,6 +127,8 @@ def in_use(model: cms.ReducedModel, setting: LoadCase) -> Real:
     names = {element.at for element in (*pairs, *setting.excitation)}
     ends = [(e, end) for e in pairs for end in ("against", "tangent", "tangent_against")]
     names |= {getattr(e, end) for e, end in ends if getattr(e, end, None) is not None}
+    around = [stop for stop in setting.stops if isinstance(stop, RoundStop)]
+    names |= {name for stop in around for pair in stop.ends for name in pair if name is not None}
     names.add(setting.observe or model.interfaces[0])
     return np.array([model.participation[name] for name in model.interfaces if name in names])
 
@@ -155,11 +158,11 @@ def shortest_contact(setting: LoadCase, model: cms.ReducedModel) -> float:
     omegas = 2.0 * np.pi * np.linspace(*setting.range_hz, 200)
     shortest = math.inf
     for stop in setting.stops:
-        c = system.stop_vector(stop)
-        row = system.displacement_row(c)
-        speed = max(_fastest(system, row, float(w)) for w in omegas)
-        if speed > 0.0:
-            shortest = min(shortest, contact_duration(stop, 1.0 / float(c @ c), speed))
+        for c in system.stop_vectors(stop):
+            row = system.displacement_row(c)
+            speed = max(_fastest(system, row, float(w)) for w in omegas)
+            if speed > 0.0:
+                shortest = min(shortest, contact_duration(stop, 1.0 / float(c @ c), speed))
     return shortest
 
 

@@ -9,6 +9,7 @@ from nldyn.base.errors import SystemModelError, check_frequency, check_range
 from nldyn.orbits.axis import Axis
 from nldyn.system.loads import Excitation
 from nldyn.system.parameters import Parameter
+from nldyn.system.round_stop import RoundStop
 from nldyn.system.stop import Stop
 from nldyn.system.system import AnyDamper, AnySpring, System
 
@@ -55,7 +56,7 @@ class LoadCase:
     """
 
     limits: tuple[float, float]
-    stops: tuple[Stop, ...] = ()
+    stops: tuple[Stop | RoundStop, ...] = ()
     dampers: tuple[AnyDamper, ...] = ()
     excitation: tuple[Excitation, ...] = ()
     modal_damping: float = 0.0

@@ -62,10 +62,14 @@ def stops_to_draw(scene: Scene) -> list[StopSphere]:
 
 def not_drawn(scene: Scene) -> list[str]:
     """Which stops cannot be drawn, each with the reason."""
-    return [
+    flat = [
         f"stop at '{stop.at}'{f' against {stop.against!r}' if stop.against else ''}, which {why}"
         for index, stop in enumerate(scene.stops)
         if (why := why_not_drawn(scene, index))
+    ]
+    return flat + [
+        f"round clearance at '{table.plane[0]}' and '{table.plane[1]}', which is all around"
+        for table in scene.round_clearances
     ]
 
 

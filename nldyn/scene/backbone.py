@@ -35,6 +35,9 @@ def undamped(scene: Scene) -> Scene:
         "damping": DampingTable(),
         "dampers": [],
         "friction": [],
+        "round_clearances": [
+            table.model_copy(update={"friction": 0.0}) for table in scene.round_clearances
+        ],
         "excitation": [e for e in scene.excitation if e.kind in ("constant", "weight")],
     }
     if scene.observe is not None:

@@ -27,7 +27,7 @@ from nldyn.scene.faults import told_as, within_component
 from nldyn.scene.load_case import load_case_of
 from nldyn.scene.matrices import build_matrices, skew_matrices
 from nldyn.scene.messages import scene_error
-from nldyn.scene.schema import Scene
+from nldyn.scene.schema import Scene, ends_of
 from nldyn.scene.stops_and_loads import acting_elements
 from nldyn.system.loads import BaseMotion
 from nldyn.system.ride import carried_apart, told_apart
@@ -366,15 +366,16 @@ def _check_rides(scene: Scene, system: System) -> None:
     if scene.modal is not None:
         return
     bases = [source for source in system.excitation if isinstance(source, BaseMotion)]
-    for table in ("stops", "friction", "springs", "dampers") if bases else ():
+    tables = ("stops", "friction", "springs", "dampers", "round_clearances")
+    for table in tables if bases else ():
         for number, element in enumerate(getattr(scene, table)):
-            if element.against is None:
-                continue
-            some, other = (_carried(scene, system, end) for end in (element.at, element.against))
-            if carried_apart(bases, some, other):
-                raise scene_error(
-                    scene.file, (), told_apart(table, number, element.at, element.against), sep=": "
-                )
+            for at, against in ends_of(element):
+                if against is None:
+                    continue
+                some, other = (_carried(scene, system, end) for end in (at, against))
+                if carried_apart(bases, some, other):
+                    told = told_apart(table, number, at, against)
+                    raise scene_error(scene.file, (), told, sep=": ")
 
 
 def _carried(scene: Scene, system: System, interface: str) -> dict[str, float]:
@@ -439,7 +440,7 @@ def _relative_system(scene: Scene, reduced: cms.ReducedModel | None) -> System:
 def check_held(scene: Scene, reduced: cms.ReducedModel) -> None:
     """Refuse what nothing holds: rigid-body motions that no spring and no stop feels."""
     rigid = reduced.frequencies_hz == 0.0
-    ends = [(stop.at, stop.against) for stop in scene.stops]
+    ends = [end for stop in (*scene.stops, *scene.round_clearances) for end in ends_of(stop)]
     ends += [(spring.at, spring.against) for spring in scene.interface_springs.values()]
     seen = [_stretch(reduced, *pair) for pair in ends]
     felt = np.array([row[rigid] / np.abs(row).max() for row in seen if row.any()])

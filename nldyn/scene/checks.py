@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.errors import SceneError, must_be_symmetric
 from nldyn.scene.messages import KeyPath, joined, scene_error, show, unknown_name
-from nldyn.scene.schema import Matrix, Scene
+from nldyn.scene.schema import Matrix, Scene, ends_of
 from nldyn.system.system import NOT_HELD, System
 
 SOUND = (10.0, 3e4)  # speeds in m/s, below those of soft rubber and above that of diamond
@@ -170,14 +170,14 @@ def _unknown_rides(scene: Scene) -> Iterator[str]:
     """Name what ties two places of which nobody knows how a moving base carries them."""
     if scene.modal is None or not any(table.kind == "base" for table in scene.excitation):
         return
-    for table in ("stops", "springs", "dampers"):
+    for table in ("stops", "springs", "dampers", "round_clearances"):
         for number, element in enumerate(getattr(scene, table)):
-            if element.against is not None:
-                yield (
-                    f"{table}[{number}]: displacements are relative to the base, and modes do not "
-                    f"tell whether it carries '{element.at}' and '{element.against}' alike, as it "
-                    "must"
-                )
+            for at, against in ends_of(element):
+                if against is not None:
+                    yield (
+                        f"{table}[{number}]: displacements are relative to the base, and modes do "
+                        f"not tell whether it carries '{at}' and '{against}' alike, as it must"
+                    )
 
 
 def _unused(scene: Scene) -> Iterator[str]:
@@ -567,6 +567,9 @@ def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
         for number, entry in enumerate(getattr(scene, kind)):
             if entry.against is not None:
                 yield (kind, number, "against"), entry.against
+    for number, around in enumerate(scene.round_clearances):
+        for key, names in (("plane", around.plane), ("against", around.against or ())):
+            yield from ((("round_clearances", number, key), name) for name in names)
     if scene.observe is not None:
         yield ("observe", "at"), scene.observe.at
     if scene.start is not None:

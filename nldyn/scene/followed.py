@@ -11,7 +11,7 @@ from nldyn.scene.messages import KeyPath, scene_error, unknown_name
 from nldyn.scene.schema import Scene
 from nldyn.scene.stops_and_loads import slider_of, sources_before
 from nldyn.system.chart import EVERY_MODE, SPEED, SPIN, THE_FREQUENCY
-from nldyn.system.parameters import OF_STOPS, SOURCES, Parameter
+from nldyn.system.parameters import OF_STOPS, SHARED, SOURCES, Parameter
 from nldyn.system.system import System
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ OF_LISTS = {  # the keys of each list of tables that may change
     "excitation": SOURCES,
     "dampers": ("coefficient",),
     "friction": ("coefficient", "normal_force"),
+    "round_clearances": (*SHARED, "clearance", "friction", "eccentricity"),
     "springs": ("stiffness", "coefficients"),
 }
 SHORT = {
@@ -75,7 +76,8 @@ def followed_parameter(scene: Scene) -> Parameter:
         known = ["force", *SHORT, *SPEEDS, "excitation.0.amplitude"]
         raise _refused(scene, unknown_name(table.parameter, known, "a key that may change"))
     number = _number(scene, rest[0], kind, len(getattr(scene, kind)))
-    if rest[1] not in OF_LISTS[kind] or len(rest) > 2 + (rest[1] == "coefficients"):
+    listed = rest[1] in ("coefficients", "eccentricity")
+    if rest[1] not in OF_LISTS[kind] or len(rest) > 2 + listed:
         refused = f"a key of {kind}.{number} that may change"
         raise _refused(scene, unknown_name(".".join(rest[1:]), OF_LISTS[kind], refused))
     return _of_element(scene, kind, number, rest[1:])
@@ -93,6 +95,12 @@ def _of_element(scene: Scene, kind: str, number: int, key: list[str]) -> Paramet
         return Parameter(
             "friction" if key[0] == "coefficient" else key[0], slider_of(scene, number)
         )
+    if kind == "round_clearances":
+        if key[0] == "eccentricity":
+            place = _number(scene, key[1] if key[1:] else "", f"{name}, a list,", 2)
+            key = [("first_eccentricity", "second_eccentricity")[place]]
+        own = "rubbing_friction" if key[0] == "friction" else key[0]
+        return Parameter(own, len(scene.stops) + number)
     if kind == "excitation":
         if getattr(table, key[0]) is None or table.kind == "base":
             fault = f"names '{name}', which one of kind '{table.kind}' has not, or must keep"

@@ -26,6 +26,8 @@ WORDS = {  # that users try for a table, and what there is
     "unbalance": "an unbalance is [[excitation]] of kind 'unbalance'",
     "contact": "contacts are [[stops]]",
     "gap": "a gap is a key of [[stops]]",
+    "clearance": "a clearance is 'gap' of [[stops]], or one all around: [[round_clearances]]",
+    "ring": "rings and pins are [[round_clearances]]",
     "impact": "impacts are computed at [[stops]]",
     "dashpot": "dashpots are [[dampers]]; that of a stop is a key of [[stops]]",
     "nonlinear_spring": f"nonlinear springs that push on contact are [[stops]]; {BETWEEN}",

@@ -609,6 +609,54 @@ class FrictionTable(Table):
         return self
 
 
+class RoundClearanceTable(Table):
+    """``[[round_clearances]]``: [ring or pin](../how-to/round_clearances.md), touched anywhere."""
+
+    plane: Annotated[list[str], Field(min_length=2, max_length=2)]
+    """Two interfaces: the displacements of one place along two perpendicular directions."""
+    clearance: Positive
+    """[m] Radial clearance, above 0: how far the place may move from the centre of a ring, or how
+    near it may come to that of a pin."""
+    stiffness: Positive
+    """[N/m^exponent] Stiffness of the contact, above 0."""
+    law: Literal["hertz", "linear"] = "hertz"
+    """`"hertz"`, or `"linear"` for a spring."""
+    exponent: Annotated[float, Field(ge=1, le=LARGEST_EXPONENT)] | None = None
+    """Exponent of the law `"hertz"`, from 1 to 4; 1.5 unless given."""
+    eccentricity: Annotated[list[Number], Field(min_length=2, max_length=2)] = [0.0, 0.0]
+    """[m] Where the centre lies beside the place at rest, along both directions."""
+    inside: bool = True
+    """`true` for a ring, in which the place is; `false` for a pin, from which it stays away."""
+    against: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
+    """Two interfaces of what is on the other side; the ground unless given."""
+    dissipation: NotNegative = 0.0
+    """[s/m] Loss of the contact (Hunt and Crossley): it grows with the penetration, 0 or more."""
+    friction: NotNegative = 0.0
+    """Coefficient of the friction along the circle; its surface slides all the time."""
+    surface_speed: Number = 0.0
+    """[m/s] Speed of the surface that turns, ΩR of a rotor, above 0 if it turns from the first
+    direction to the second. Needed where there is `friction`."""
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> RoundClearanceTable:
+        if self.plane[0] == self.plane[1]:
+            raise ValueError("needs two different interfaces in 'plane'")
+        if self.against is not None and set(self.against) & set(self.plane):
+            raise ValueError("needs other interfaces than its own in 'against'")
+        if self.law == "linear":
+            _refuse(self, ("exponent",), "law 'linear'")
+        if self.friction and not self.surface_speed:
+            raise ValueError("has 'friction', which needs the 'surface_speed' of what turns")
+        return self
+
+    @property
+    def ends(self) -> list[tuple[str, str | None]]:
+        """Both directions: the interface, and that on the other side."""
+        if self.against is None:
+            return [(name, None) for name in self.plane]
+        return list(zip(self.plane, self.against, strict=True))
+
+
 class StopTable(Table):
     """``[[stops]]``: a stop that an interface hits."""
 
@@ -1068,6 +1116,7 @@ class Scene(StructureTables):
     damping: DampingTable = DampingTable()
     dampers: list[DamperTable] = []
     stops: list[AnyStopTable] = []
+    round_clearances: list[RoundClearanceTable] = []
     friction: list[FrictionTable] = []
     excitation: list[ExcitationTable] = []
     observe: ObserveTable | None = None
@@ -1167,6 +1216,15 @@ def _exactly_one(table: BaseModel, *names: str) -> None:
         fault = ("has both" if len(given) == 2 else "has") if given else "needs one of"
         listed = ", ".join(f"'{name}'" for name in chosen[:-1]) + f" and '{chosen[-1]}'"
         raise ValueError(f"{fault} {listed}" + ("; keep one" if given else ""))
+
+
+def ends_of(
+    table: StopTable | FrictionTable | SpringTable | DamperTable | RoundClearanceTable,
+) -> list[tuple[str, str | None]]:
+    """The interfaces at both ends of an element, of a round clearance along both directions."""
+    if isinstance(table, RoundClearanceTable):
+        return table.ends
+    return [(table.at, table.against)]
 
 
 def _refuse_own(table: StopTable | FrictionTable | SpringTable | DamperTable | JointTable) -> None:

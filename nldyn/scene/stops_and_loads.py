@@ -18,6 +18,7 @@ from nldyn.scene.schema import (
     HertzStopTable,
     LinearStopTable,
     RigidStopTable,
+    RoundClearanceTable,
     Scene,
     SpringTable,
     StopTable,
@@ -26,6 +27,7 @@ from nldyn.system.friction import DryFriction, Friction
 from nldyn.system.loads import BaseMotion, ConstantForce, Excitation, HarmonicForce, Unbalance
 from nldyn.system.measured import MeasuredForce, measured_force
 from nldyn.system.rigid_stop import AnyStop, RigidStop
+from nldyn.system.round_stop import RoundStop
 from nldyn.system.springs_dampers import CubicDamper, Damper, PolynomialSpring, Spring
 from nldyn.system.stop import Stop, dashpot_for, dissipation_for, hertz_stiffness
 from nldyn.system.system import AnyDamper, AnySpring, Elements
@@ -37,7 +39,10 @@ def acting_elements(scene: Scene) -> Elements:
     """The stops, dampers and excitation of a scene; a `SceneError` says what is wrong with one."""
     with told_as(scene, (), SystemModelError):
         return Elements(
-            stops=_rough(scene, [_stop(stop) for stop in scene.stops]),
+            stops=(
+                *_rough(scene, [_stop(stop) for stop in scene.stops]),
+                *map(_round_stop, scene.round_clearances),
+            ),
             dampers=(*map(_damper, scene.dampers), *map(_dry, dry_tables(scene))),
             excitation=tuple(
                 source
@@ -120,6 +125,25 @@ def _stop(table: StopTable) -> AnyStop:
     exponent, loss = table.exponent or 1.5, _dissipation(table)
     place = table.gap, table.direction, table.against
     return Stop(table.at, stiffness, exponent, *place, loss, dashpot=table.dashpot)
+
+
+def _round_stop(table: RoundClearanceTable) -> RoundStop:
+    """One of those that come after the stops."""
+    x, y = table.eccentricity
+    (first, other), (second, beside) = table.ends
+    against = None if other is None or beside is None else (other, beside)
+    return RoundStop(
+        (first, second),
+        table.stiffness,
+        table.clearance,
+        1.0 if table.law == "linear" else table.exponent or 1.5,
+        (x, y),
+        table.inside,
+        against,
+        table.dissipation,
+        friction=table.friction,
+        surface_speed=table.surface_speed,
+    )
 
 
 def _linear_stop(table: LinearStopTable) -> Stop:

@@ -369,3 +369,28 @@ def test_derivatives_by_parameters_are_those_of_differences(inside):
             change = (ends[0] - ends[1]) / (2.0 * step)
             errors.append(np.abs(change - column).max() / np.abs(column).max())
         assert min(errors) < 1e-5, parameter
+
+
+def test_a_branch_goes_on_where_the_whirl_touches_all_around():
+    stop = RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=0.01, surface_speed=5.0)
+    branch = continue_branch(solve_orbit(jeffcott([stop], 1e-3), 8.0), (8.0, 10.5))
+    assert branch.stop_reason == "end of the frequency range / end of the frequency range"
+    free, touching = branch.points[0], branch.points[-1]
+    assert free.max_penetration == 0.0
+    whirl = Whirl(stop, 1e-3, touching.frequency_hz)
+    assert touching.max_penetration == pytest.approx(whirl.r - CLEARANCE, rel=1e-9)
+
+
+def test_grazing_beside_a_weight_is_that_in_closed_form():
+    stop, weight = RoundStop(("x", "y"), 5e4, CLEARANCE), 3.0
+    system = jeffcott([stop], 1e-3, ConstantForce("x", weight))
+    branch = continue_branch(solve_orbit(system, 7.0), (6.8, 8.0))
+
+    def room(hz):
+        w = 2.0 * np.pi * hz
+        swing = 1e-3 * w**2 / abs(STIFFNESS - MASS * w**2 + 1j * DAMPING * w)
+        return CLEARANCE - weight / STIFFNESS - swing
+
+    known = brentq(room, 7.0, 8.0, xtol=1e-13)
+    found = next(point for point in branch.special_points if point.kind == "GR")
+    assert found.frequency_hz == pytest.approx(known, rel=1e-9)

@@ -1,0 +1,93 @@
+"""``[[round_clearances]]`` of a scene."""
+
+import pytest
+
+from nldyn import Parameter, RoundStop
+from nldyn.app.describe import describe_stop
+from nldyn.base.errors import SceneError
+from nldyn.base.resources import example
+from nldyn.report.stop_spheres import not_drawn
+from nldyn.scene.backbone import undamped
+from nldyn.scene.build import build_system
+from nldyn.scene.followed import followed_parameter
+from nldyn.scene.read import load_scene
+
+SCENE = example("rotor_in_a_ring.toml").read_text()
+RING = RoundStop(("x", "y"), 2e6, 6e-4, 1.0, friction=0.08, surface_speed=5.0)
+
+
+def scene_of(tmp_path, *changes):
+    text = SCENE
+    for old, new in changes:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    return load_scene(path)
+
+
+def test_a_table_becomes_a_round_stop_behind_the_others(tmp_path):
+    other = '\n[[stops]]\nat = "x"\nstiffness = 1e9\ngap = 1.0\n[observe]'
+    scene = scene_of(tmp_path, ("\n[observe]", other))
+    system = build_system(scene)
+    assert system.stops[1] == RING
+    assert "ring around 'x', 'y'" in describe_stop(system.stops[1])
+    assert not_drawn(scene)[-1] == "round clearance at 'x' and 'y', which is all around"
+    assert build_system(undamped(scene)).stops[1].friction == 0.0
+
+
+def test_all_keys_are_taken(tmp_path):
+    more = (
+        'law = "hertz"\nexponent = 2.0\neccentricity = [1e-5, -2e-5]\ninside = false\n'
+        "dissipation = 0.1\nagainst = ['sx', 'sy']"
+    )
+    scene = scene_of(
+        tmp_path,
+        ('law = "linear"', more),
+        ("[[10.0, 0.0], [0.0, 10.0]]", "[[10.0, 0, 0, 0], [0, 10.0, 0, 0], [0, 0, 5.0, 0], "
+         "[0, 0, 0, 5.0]]"),
+        ("[[4e5, 0.0], [0.0, 4e5]]", "[[4e5, 0, 0, 0], [0, 4e5, 0, 0], [0, 0, 4e6, 0], "
+         "[0, 0, 0, 4e6]]"),
+        ("damping = [[300.0, 0.0], [0.0, 300.0]]\n", ""),
+        ("interfaces.x = [1.0, 0.0]", "interfaces.x = [1.0, 0, 0, 0]"),
+        ("interfaces.y = [0.0, 1.0]", "interfaces.y = [0, 1.0, 0, 0]\n"
+         "interfaces.sx = [0, 0, 1.0, 0]\ninterfaces.sy = [0, 0, 0, 1.0]"),
+    )  # fmt: skip
+    assert build_system(scene).stops == (
+        RoundStop(
+            ("x", "y"), 2e6, 6e-4, 2.0, (1e-5, -2e-5), False, ("sx", "sy"), 0.1, friction=0.08,
+            surface_speed=5.0,
+        ),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("key", "parameter"),
+    [
+        ("clearance", Parameter("clearance", 0)),
+        ("friction", Parameter("rubbing_friction", 0)),
+        ("eccentricity.1", Parameter("second_eccentricity", 0)),
+        ("stiffness", Parameter("stiffness", 0)),
+    ],
+)
+def test_its_numbers_may_change(tmp_path, key, parameter):
+    changed = f'frequency_hz = 30.0\nparameter = "round_clearances.0.{key}"\nrange = [1e-4, 1e-2]'
+    scene = scene_of(tmp_path, ("range_hz = [24.0, 42.0]", changed))
+    assert followed_parameter(scene) == parameter
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (('plane = ["x", "y"]', 'plane = ["x", "z"]'), "round_clearances.*'z'"),
+        (('plane = ["x", "y"]', 'plane = ["x", "x"]'), "different"),
+        (('plane = ["x", "y"]', 'plane = ["x"]'), "plane"),
+        (("clearance = 6e-4", "clearance = 0.0"), "clearance"),
+        (("surface_speed = 5.0", ""), "surface_speed"),
+        (('law = "linear"', 'law = "linear"\nexponent = 2.0'), "exponent"),
+        (('law = "linear"', 'law = "linear"\ngap = 2.0'), "gap"),
+    ],
+)
+def test_faults_are_told(tmp_path, change, said):
+    with pytest.raises(SceneError, match=said):
+        build_system(scene_of(tmp_path, change))
