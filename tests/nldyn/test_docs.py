@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import re
 from pathlib import Path
 
@@ -84,6 +85,16 @@ def test_examples_of_rigid_stops_print_what_the_pages_say(capsys):
     kinds = [*zip(["GR", "PD", "PD"], lower, strict=True)][::-1]
     kinds += [("PD", hz) for hz in flips.split(", ")]
     assert ast.literal_eval(line) == [(kind, float(hz)) for kind, hz in kinds]
+
+
+def test_example_of_round_clearances_is_a_circular_whirl(capsys):
+    """Whose radius r solves |(k - mω² + icω) r + (1 + iμ) k_r (r - c)| = U ω²."""
+    (line,) = printed_by("how-to/round_clearances.md", capsys)
+    depth, force = (float(x) for x in re.findall(r"[\d.]+(?= mm| N)", line))
+    w, radius = 60.0 * math.pi, 6e-4 + 1e-3 * depth
+    pull = (4e5 - 10.0 * w**2 + 300j * w) * radius + (1.0 + 0.08j) * 2e3 * depth
+    assert abs(pull) == pytest.approx(2e-3 * w**2, rel=2e-3)
+    assert force == pytest.approx(2e3 * depth, abs=0.2) and line.endswith("stable: True")
 
 
 def test_example_of_backbones_keeps_its_energy(capsys):

@@ -14,16 +14,20 @@ from nldyn import (
     FlowMap,
     HarmonicForce,
     Parameter,
+    PolynomialSpring,
     RoundStop,
     Stop,
     System,
     SystemModelError,
     Unbalance,
     continue_branch,
+    impacts,
     load,
     save,
+    simulate,
     solve_orbit,
 )
+from nldyn.system import DryFriction
 from nldyn.system.chart import value_of, with_value
 from nldyn.system.equilibrium import rest
 from tests.rubbing import Ring, Rotor
@@ -394,3 +398,50 @@ def test_grazing_beside_a_weight_is_that_in_closed_form():
     known = brentq(room, 7.0, 8.0, xtol=1e-13)
     found = next(point for point in branch.special_points if point.kind == "GR")
     assert found.frequency_hz == pytest.approx(known, rel=1e-9)
+
+
+def test_round_stops_act_beside_all_else_that_acts():
+    def flow(stops, *dampers):
+        system = System.from_matrices(
+            MASS * np.eye(3), STIFFNESS * np.eye(3),
+            {"x": [1.0, 0.0, 0.0], "y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]},
+            damping=DAMPING * np.eye(3), stops=stops,
+            springs=[PolynomialSpring("z", [0.0, 0.0, 1e9])],
+            dampers=dampers,
+            excitation=[Unbalance("x", 2e-3), Unbalance("y", 2e-3, phase_deg=-90.0),
+                        HarmonicForce("z", 12.0)],
+        )  # fmt: skip
+        return FlowMap(system)
+
+    def ring(**other):
+        return RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, **other)
+
+    pressed = Stop.linear("x", 2e4, gap=8e-4)
+    rough = Stop("x", 2e4, 1.0, 8e-4, tangent="z", friction=0.2)
+    start, w = np.array([[1.2e-3, 0.3e-3, 1e-4, 0.01, 0.05, 0.02]]), 2.0 * np.pi * 11.0
+    # what acts along z alone does not know of the plane, and the plane nothing of it
+    both = flow([pressed, ring(friction=0.1, surface_speed=3.0)], DryFriction("z", 2.0, 0.3))
+    plane = FlowMap(jeffcott([pressed, ring(friction=0.1, surface_speed=3.0)]))
+    z = both.to_modal(both.shoot(both.to_state(start), PERIOD, w).ends)[0]
+    other = plane.to_modal(plane.shoot(plane.to_state(start[:, [0, 1, 3, 4]]), PERIOD, w).ends)[0]
+    assert z[[0, 1, 3, 4]] == pytest.approx(other, rel=1e-9)
+    # two rings of half the stiffness are one
+    one, two = (
+        flow([rough, *rings]) for rings in (
+            [ring()], [RoundStop(("x", "y"), 2.5e4, CLEARANCE, 1.0) for _ in range(2)])
+    )  # fmt: skip
+    ends = [one.shoot(start, PERIOD, w), two.shoot(start, PERIOD, w)]
+    assert not ends[0].failure and not ends[1].failure and ends[0].closings.any()
+    assert ends[0].ends == pytest.approx(ends[1].ends, rel=1e-8)
+    assert ends[0].jacobians == pytest.approx(ends[1].jacobians, abs=1e-6)
+
+
+def test_impacts_of_a_motion_are_those_of_its_orbit():
+    stop = RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=0.02, surface_speed=5.0)
+    orbit = solve_orbit(jeffcott([stop], 1e-3, ConstantForce("x", 3.0)), 8.0)
+    (hit,) = orbit.impact_list
+    motion = simulate(orbit.system, 8.0, periods=2, start=orbit.states(np.zeros(1))[0])
+    table = impacts(motion)
+    assert table.penetration[0] == pytest.approx(hit.penetration, rel=1e-5)
+    assert table.peak_force[0] == pytest.approx(hit.force, rel=1e-5)
+    assert table.impulse[0] > 0.0 and abs(table.loss[0]) < 1e-9 * table.work[0]
