@@ -89,6 +89,8 @@ def _read_line(gathered: Gathered, card: Card, lines: _Lines) -> None:
         tuple(c - 1 for c in card.components(at)) if card.text(at) not in ("", "0") else ()
         for at in (8, 9)
     )
+    if any(len(directions) == 6 for directions in pins):
+        raise card.fail("its pins (PA or PB) free all six directions of an end: it joins nothing")
     lines.pins.append(pins)
     if any(card.text(at) for at in (16, 17)):
         deck.leave_out("warping at the ends of CBEAM", card.place, "beams warp freely")

@@ -126,6 +126,19 @@ class Deck:
             )
         return found[0] if found else None
 
+    def existing(self, card: Card, numbers: Sequence[int]) -> list[int]:
+        """The points of a card with THRU that are there; how many are not is told.
+
+        Without THRU all stay, so that one that is missing is refused where it is looked up.
+        """
+        if "THRU" not in card.texts(0):
+            return list(numbers)
+        found = [n for n in numbers if n in self.grids or n in self.scalars]
+        if missing := len(numbers) - len(found):
+            what = f"points of {card.name} with THRU that are not defined"
+            self.leave_out(what, card.place, "the others of its range are taken", missing)
+        return found
+
     def place(self, number: int, card: Card) -> FloatArray:
         """Basic coordinates of a grid point that a card names."""
         if number in self.places:

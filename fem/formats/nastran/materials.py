@@ -13,6 +13,8 @@ from fem.formats.nastran.deck import Deck
 
 SAME = 1e-3  # relative: moduli that are those of one isotropic material
 EXPANSION = "thermal expansion is not used: stiffness and mass are those of the cold structure"
+CONTRADICTING = 0.01
+"""Relative difference between G and E / (2 (1 + NU)) from which Nastran warns."""
 DAMPINGS = {"MAT1": 7, "MAT2": 12, "MAT8": 16, "MAT9": 30}
 """Where the coefficient of structural damping (GE) stands."""
 EXPANSIONS = {"MAT1": (5,), "MAT2": (8, 9, 10), "MAT8": (8, 9), "MAT9": tuple(range(23, 29))}
@@ -20,7 +22,11 @@ EXPANSIONS = {"MAT1": (5,), "MAT2": (8, 9, 10), "MAT8": (8, 9), "MAT9": tuple(ra
 
 @dataclass(frozen=True)
 class Isotropic:
-    """Young's and the shear modulus, Poisson's ratio and the density of MAT1."""
+    """Young's and the shear modulus, Poisson's ratio and the density of MAT1.
+
+    Where the three contradict each other, E and nu are those of solids and of the membranes and
+    the bending of plates, and G that of transverse shear and torsion.
+    """
 
     youngs_modulus: float
     shear_modulus: float
@@ -35,12 +41,10 @@ class Isotropic:
 
     @property
     def plane_law(self) -> FloatArray:
-        """Stiffness (3, 3) in plane stress."""
+        """Stiffness (3, 3) in plane stress, of E and nu."""
         E, nu = self.youngs_modulus, self.poissons_ratio
-        factor = E / (1.0 - nu**2)
-        return np.array(
-            [[factor, nu * factor, 0], [nu * factor, factor, 0], [0, 0, self.shear_modulus]]
-        )
+        law = np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, (1.0 - nu) / 2.0]])
+        return np.asarray(E / (1.0 - nu**2) * law, dtype=np.float64)
 
     @property
     def shear_law(self) -> FloatArray:
@@ -95,12 +99,36 @@ class Materials:
             G = E / (2.0 * (1.0 + nu))
         if not E > 0.0:
             raise card.fail(f"its Young's modulus is {E:g} and must be positive")
+        self._tell_of_ratio(card, E, G, nu)
         return Isotropic(E, G, nu, self.factor * card.real(4))
+
+    def _tell_of_ratio(self, card: Card, E: float, G: float, nu: float) -> None:
+        """Note that E, G and nu contradict, or that no material has the ratio of E and G."""
+        told = f"{self.deck.source}: {card.place}: MAT1 {card.whole(0)}"
+        note = ""
+        if G > 0.0 and abs(1.0 - E / (2.0 * (1.0 + nu) * G)) > CONTRADICTING:
+            note = (
+                f"{told}: E, G and NU contradict each other; E and NU are those of solids and of"
+                " membranes and bending of shells, E and G those of bars and of transverse shear"
+            )
+        elif card.text(1) and card.text(2) and not -1.0 < nu <= 0.5:
+            note = (
+                f"{told}: its E and G make Poisson's ratio {nu:.6g}; bars take G = {G:g} as it is,"
+                " unless NU should stand in field 5"
+            )
+        if note and note not in self.deck.notes:
+            self.deck.notes.append(note)
 
     def _resisting_shear(self, card: Card) -> Isotropic:
         law = self._isotropic(card)
         if not law.shear_modulus > 0.0:
             raise card.fail("its G is 0 (Nastran takes G and NU as 0 if both are blank); give NU")
+        nu = law.poissons_ratio
+        if not -1.0 < nu < 0.5:
+            raise card.fail(
+                f"its Poisson's ratio is {nu:.6g}, not between -1 and 0.5"
+                + ("" if card.text(3) else ", by its E and G; does NU stand in the field of G?")
+            )
         return law
 
     def plane(self, number: int, card: Card) -> Isotropic | Plane:

@@ -71,6 +71,10 @@ def _read_scalar(
     ends = _ends(gathered, card, 2, n)
     if not ends:
         raise card.fail("is joined to no point")
+    if len(ends) == 2 and ends[0] == ends[1]:
+        reason = "both of its ends are one direction of one point"
+        gathered.deck.leave_out(f"{card.name} between a point and itself", card.place, reason)
+        return
     if value == 0.0:
         gathered.deck.leave_out(f"{card.name} of the number 0", card.place, "it does nothing")
         return

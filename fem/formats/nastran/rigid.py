@@ -115,12 +115,9 @@ def _read_rbe2(gathered: Gathered, card: Card) -> None:
         gathered.deck.leave_out("expansion of RBE2", card.place, "it is not used")
     if not slaves:
         raise card.fail("has no dependent grid point")
-    spread = "THRU" in card.texts(3)
-    for slave in dict.fromkeys(slaves):
+    for slave in dict.fromkeys(gathered.deck.existing(card, slaves)):
         if slave == master:
             raise card.fail(f"grid point {slave} depends on itself")
-        if spread and slave not in gathered.deck.grids:
-            continue
         _follow(gathered, card, master, slave, components)
 
 

@@ -101,10 +101,8 @@ def _given(deck: Deck, sets: frozenset[int]) -> Iterator[tuple[Card, int, set[in
                 yield card, number, _components(deck, card, number, at + 1)
     for card in deck.of("SPC1"):
         if card.whole(0) in sets:
-            spread = "THRU" in card.texts(2)
-            for number in card.wholes(2):
-                if number in deck.grids or number in deck.scalars or not spread:
-                    yield card, number, _components(deck, card, number, 1)
+            for number in deck.existing(card, card.wholes(2)):
+                yield card, number, _components(deck, card, number, 1)
 
 
 def _components(deck: Deck, card: Card, number: int, at: int) -> set[int]:

@@ -80,6 +80,14 @@ def test_pins_let_ends_turn(tmp_path):
     np.testing.assert_allclose(lowest(component(tmp_path, cards), 2), expected, rtol=1e-3)
 
 
+def test_pins_in_all_directions_are_refused(tmp_path):
+    cards = cantilever("CBAR", "PBAR,7,1,1.-4,2.-9,1.-9,1.-9\n", 1).replace(
+        "1.,0.\nP", "1.,0.\n,123456\nP"
+    )
+    with pytest.raises(fem.ModelError, match=r"CBAR: its pins \(PA or PB\) free all six"):
+        component(tmp_path, cards)
+
+
 def test_a_tapered_beam_carries_its_mean_mass(tmp_path):
     prop = "PBEAM,7,1,1.-4,2.-9,1.-9,,1.-9,.1\n,,,,,,,,\n,NO,1.,3.-4,4.-9,2.-9,,2.-9,.3\n"
     found = component(tmp_path, cantilever("CBEAM", prop, 1))

@@ -144,6 +144,21 @@ def test_structural_damping_and_warping_are_told(tmp_path):
     assert {"GE of PELAS", "GE of CELAS2", "GE of PBUSH", "warping at the ends of CBEAM"} <= told
 
 
+def test_points_of_a_range_that_are_not_there_and_springs_that_join_nothing_are_told(tmp_path):
+    cards = (
+        "SPC1,1,3,6,THRU,10\nSPC1,1,3,200,THRU,210\nRBE2,9,1,123,2,THRU,9\nCELAS2,7,1.,1,2,1,2\n"
+    )
+    mesh = read(tmp_path, cards)
+    told = {item.keyword: (item.count, item.place) for item in mesh.left_out}
+    assert told == {
+        "points of SPC1 with THRU that are not defined": (2 + 11, "line 17"),
+        "points of RBE2 with THRU that are not defined": (1, "line 19"),
+        "CELAS2 between a point and itself": (1, "line 20"),
+    }
+    with pytest.raises(fem.ModelError, match="line 17: SPC1: names the grid point 9, which is not"):
+        read(tmp_path, "SPC1,1,3,8,9\n")
+
+
 def test_masses_have_numbers_of_their_own_and_directions_may_have_blanks(tmp_path):
     text = f"CONM2,1,2,,3.\nSPC1    1       12  3   1\nCONM2  *{2:<16}{3:<16}{0:<16}{5.0:<16}\n*\n"
     mesh = read(tmp_path, text)

@@ -66,6 +66,31 @@ def test_numbers_of_pshell_become_matrices(tmp_path):
     np.testing.assert_allclose(np.diag(both.coupling), -1e-4 * np.array([1e9, 1e9, 1e8]))
 
 
+def test_moduli_that_contradict_are_told_and_each_element_takes_its_two(tmp_path):
+    """E and NU for solids, membranes and bending, G for transverse shear and torsion [1].
+
+    [1] Altair, OptiStruct 2021, "Material Property Checks for MAT1", usage rules.
+    """
+    E, G, nu, t = 2e11, 3e10, 0.3, 0.01
+    cards = QUAD + (
+        "PSHELL,3,7,.01,7,,7\nMAT1,7,2.+11,3.+10,.3,8000.\nPSOLID,7,7\n"
+        "GRID,11,,0.,0.,5.\nGRID,12,,1.,0.,5.\nGRID,13,,0.,1.,5.\nGRID,14,,0.,0.,6.\n"
+        "CTETRA,90,7,11,12,13,14\nPBAR,5,7,1.-4,2.-9,1.-9,4.-9\nCBAR,91,5,11,12,0.,1.,0.\n"
+    )
+    mesh = read(tmp_path, cards)
+    (told,) = [note for note in mesh.notes if "contradict" in note]
+    assert "line 15: MAT1 7: E, G and NU contradict each other; E and NU are those of" in told
+    parts = fem.parts_of(mesh)
+    assert parts["PSOLID 7"].material == fem.Material(E, 8000.0, nu)
+    section, bar = parts["PSHELL 3"].section, parts["PBAR 5"]
+    law = E / (1 - nu**2) * np.array([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
+    np.testing.assert_allclose(section.membrane, t * law, rtol=1e-12)
+    np.testing.assert_allclose(section.bending, t**3 / 12 * law, rtol=1e-12)
+    np.testing.assert_allclose(section.shear, 5 / 6 * t * G * np.eye(2), rtol=1e-3)
+    twist = bar.material.youngs_modulus / (2 * (1 + bar.material.poissons_ratio))
+    assert twist * bar.section.torsion_constant == pytest.approx(G * 4e-9)
+
+
 PLIES = "MAT8,8,1.4+11,1.+10,.3,5.+9,4.+9,3.+9,1600.\n"
 
 
@@ -131,6 +156,10 @@ def test_what_is_not_used_is_told(tmp_path):
         ("PSHELL,4,1,.01\n", "PSHELL 3 of CQUAD4 in line 13 is not defined"),
         ("PSHELL,3,1,.01,-1\n", "plane strain"),
         ("PSHELL,3,7,.01,7\nMAT1,7,2.+11\n", "MAT1: its G is 0 .* give NU"),
+        (
+            "PSHELL,3,7,.01,7\nMAT1,7,2.+11,.3\n",
+            r"line 15: MAT1: its Poisson's ratio is 3.33333e\+11, .*; does NU stand in the field",
+        ),
         ("PSHELL,3,1,.01\nGRID,9,,2.,0.,0.\nCTRIA3,8,3,2,9,3\n,,.03\n", "TFLAG"),
     ],
 )
