@@ -1,5 +1,6 @@
 """The site of the documentation, made by `make docs`; what is special of it is in `_site/`."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -15,6 +16,7 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
     "sphinx_copybutton",
     "from_sources",
 ]
@@ -34,9 +36,20 @@ maximum_signature_line_length = 88
 suppress_warnings = ["ref.python"]  # names of attributes are no links
 python_use_unqualified_type_names = True
 toc_object_entries_show_parents = "hide"
+viewcode_follow_imported_members = True
+viewcode_line_numbers = True
+
+if os.environ.get("NLDYN_DOCS_ONLINE"):  # links to types of others need their lists of names
+    extensions.append("sphinx.ext.intersphinx")
+    intersphinx_mapping = {
+        "python": ("https://docs.python.org/3", None),
+        "numpy": ("https://numpy.org/doc/stable", None),
+        "scipy": ("https://docs.scipy.org/doc/scipy", None),
+        "matplotlib": ("https://matplotlib.org/stable", None),
+    }
 
 html_theme = "furo"
-html_title = "nldyn"
+html_title = f"nldyn {release}"
 html_math_renderer = "mathml"  # browsers draw it without a script
 html_show_copyright = False
 html_copy_source = False

@@ -1,33 +1,26 @@
 """What the site takes from elsewhere: lists of pages, docstrings, the gallery, formulas.
 
 The pages stay plain Markdown that can be read in the repository. Before Sphinx parses them, the
-list of pages becomes the navigation, ``{public}`` becomes the docstrings of a room, and a script
+list of pages becomes the navigation, ``{public}`` becomes the table of a room's names, and a script
 of the gallery becomes a page and a notebook.
 """
 
 from __future__ import annotations
 
 import ast
-import inspect
 import re
-from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import jupytext
 from docutils import nodes
 from latex2mathml.converter import convert
+from public import PUBLIC, table, write_pages
+from scene_search import SceneDomain, with_places
 from sphinx.application import Sphinx
-from sphinx.util import logging
 from sphinx.writers.html5 import HTML5Translator
 
-import nldyn
-from nldyn.base.face import homes
-
-log = logging.getLogger(__name__)
 DOCS = Path(__file__).resolve().parents[1]
-PUBLIC = re.compile(r"```\{public\} ([\w.]+)\n```\n")
 LISTED = re.compile(r"^\*\*([\w ]+)\*\*:(.*?)(?:\n\n|\Z)", flags=re.M | re.S)
 FRONT = '<!doctype html><meta http-equiv="refresh" content="0; url=README.html">'
 
@@ -38,42 +31,6 @@ def navigation(text: str) -> str:
         pages = "\n".join(re.findall(r"\]\(([\w/-]+)\.md\)", body))
         text += f"\n\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{pages}\n```\n"
     return text
-
-
-def public_names(room: str) -> list[str]:
-    """Full names of what a package shows, or a room of nldyn."""
-    known = homes("nldyn", nldyn.__path__)
-    in_the_face = [name for name in nldyn.__all__ if known[name].startswith(f"{room}.")]
-    shown = getattr(import_module(room), "__all__", ())
-    return [f"nldyn.{name}" for name in in_the_face] + [f"{room}.{name}" for name in shown]
-
-
-def undocumented(name: str, thing: Any) -> Iterator[str]:
-    """Names of what lacks a docstring: the thing itself, its public methods and properties."""
-    if not inspect.getdoc(thing):
-        yield name
-    if inspect.isclass(thing):
-        own = {key: value for key, value in vars(thing).items() if not key.startswith("_")}
-        for key, value in own.items():
-            if (inspect.isfunction(value) or isinstance(value, property)) and not value.__doc__:
-                yield f"{name}.{key}"
-
-
-def docstrings(room: str, page: str) -> str:
-    """Directives for all public names of a room; what has no docstring is a fault."""
-    lines = ["```{eval-rst}"]
-    names = public_names(room)
-    if not names:
-        log.warning("%s shows no public name", room, location=page)
-    for name in sorted(names, key=str.lower):
-        package, _, last = name.rpartition(".")
-        thing = getattr(import_module(package), last)
-        for lacking in undocumented(name, thing):
-            log.warning("%s has no docstring", lacking, location=page)
-        kind = "class" if inspect.isclass(thing) else "function" if callable(thing) else "data"
-        kind = "exception" if kind == "class" and issubclass(thing, BaseException) else kind
-        lines += [f".. auto{kind}:: {name}", ""]
-    return "\n".join([*lines, "```", ""])
 
 
 def parts_of(script: str) -> tuple[str, str, str]:
@@ -97,7 +54,7 @@ def notebook(script: str) -> str:
     """A script of the gallery as a notebook, as JSON."""
     title, text, code = parts_of(script)
     said = "\n".join(f"# {line}".rstrip() for line in f"# {title}\n\n{text}".splitlines())
-    cells = jupytext.reads(f"# %% [markdown]\n{said}\n\n# %%\n{code}\n", "py:percent")
+    cells = jupytext.reads(f"{said}\n\n{code}\n", "py:light")  # a cell for each paragraph
     return jupytext.writes(cells, "ipynb")
 
 
@@ -127,10 +84,12 @@ def read_source(app: Sphinx, page: str, source: list[str]) -> None:
         source[0] = navigation(source[0])
     elif path.suffix == ".py":
         source[0] = gallery_page(source[0], path.stem)
+    elif page == "reference/scene":
+        source[0] = with_places(source[0])[0]
     elif page == "gallery/README":
         source[0] += "\n```{toctree}\n:hidden:\n:glob:\n\n[!R]*\n```\n"
     source[0] = without_far_links(source[0], path.parent)
-    source[0] = PUBLIC.sub(lambda found: docstrings(found[1], page), source[0])
+    source[0] = PUBLIC.sub(lambda found: table(found[1], page), source[0])
 
 
 def finish(app: Sphinx, exception: Exception | None) -> None:
@@ -159,6 +118,8 @@ def formula(translator: HTML5Translator, node: nodes.math_block) -> None:
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Take part in the build."""
+    write_pages(DOCS)
+    app.add_domain(SceneDomain)
     app.connect("source-read", read_source)
     app.connect("build-finished", finish)
     app.connect("autodoc-process-docstring", plain_references, priority=1000)
