@@ -9,13 +9,22 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: paper atlas test slow check bench hard faults sanitize wheels docs clean
+.PHONY: lock paper atlas test slow check bench hard faults sanitize wheels docs clean
 
-$(VENV)/.installed: pyproject.toml compile_engine.py $(wildcard nldyn/engine/*.[ch])
+# the versions are those of .ci/lock.txt, which `make lock` makes anew of the newest
+$(VENV)/.installed: pyproject.toml .ci/lock.txt compile_engine.py $(wildcard nldyn/engine/*.[ch])
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[dev]"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+		--constraint .ci/lock.txt -e ".[dev]"
 	@$(BIN)/python -c "from nldyn.engine.library import built_by; print('engine:', built_by())"
 	touch $@
+
+lock:
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-header \
+		--no-annotate --no-emit-index-url --no-emit-find-links --extra dev \
+		--output-file .ci/lock.txt pyproject.toml
 
 paper: $(VENV)/.installed
 	PYTHONPATH=tests $(BIN)/python -m paper --out results/paper

@@ -35,11 +35,13 @@ def test_a_notebook_of_the_gallery_runs(monkeypatch, tmp_path):
         pytest.importorskip(package)
     monkeypatch.chdir(tmp_path)
     matplotlib.use("Agg")
+    monkeypatch.syspath_prepend(str(DOCS / "_site"))
     made = runpy.run_path(str(DOCS / "_site" / "from_sources.py"))
     script = (DOCS / "gallery" / "cantilever_modes.py").read_text(encoding="utf-8")
     told, *code = json.loads(made["notebook"](script))["cells"]
     assert told["cell_type"] == "markdown" and "".join(told["source"]).startswith("# ")
     names: dict[str, object] = {}
+    assert len(code) > 1  # a cell for each paragraph
     for cell in code:
         assert cell["cell_type"] == "code"
         exec("".join(cell["source"]), names)  # its own assertion fails where the number is another

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from docutils.nodes import Element
 from scene_keys import PAGE, TABLE, name_of
 from sphinx.domains import Domain, ObjType
 
@@ -41,6 +42,10 @@ class SceneDomain(Domain):
         """Each key with its place; nothing else goes before them in a search."""
         for name, place in with_places(Path(PAGE).read_text(encoding="utf-8"))[1].items():
             yield name, name, "key", "reference/scene", place, 0
+
+    def resolve_any_xref(self, *_: object) -> list[tuple[str, Element]]:
+        """Pages link to keys by nothing."""
+        return []
 
     def merge_domaindata(self, docnames: set[str], otherdata: dict[str, object]) -> None:
         """Nothing is kept of what pages say."""

@@ -222,7 +222,7 @@ class _Legacy:
 
     def _keep(self, coded: str, values: np.ndarray, rows: int, columns: int) -> None:
         """Keep an array of the present section if it says something of the mesh."""
-        name = unquote(coded)
+        name = unquote(coded.replace("%%", "%"))  # as VTK 9.4 writes names of colours
         if is_needed(name) and self.section:
             known = self.data.setdefault(self.section, {})
             check_each_once([*known, name], str(self.path))
