@@ -416,6 +416,13 @@ def other_tangent(special: SpecialPoint) -> Real:
     Of the two solutions of the branching equation it is the one further from the direction of the
     branch on which the point was found.
     """
+    weights, tangents = special.point.family.metric(special.point.point), crossing_tangents(special)
+    along = [abs(float(special.point.tangent @ (weights * t))) for t in tangents]
+    return tangents[int(np.argmin(along))]
+
+
+def crossing_tangents(special: SpecialPoint) -> list[Real]:
+    """Unit tangents (N + 1,) of the two branches that cross at a branch point."""
     found = crossing(loop_of(special.point))
     if not found.roots:
         raise CoefficientError("the branching equation has no real solution")
@@ -424,8 +431,7 @@ def other_tangent(special: SpecialPoint) -> Real:
     for alpha, beta in found.roots:
         tangent = np.append((alpha * found.q + beta * found.v).ravel(), beta)
         tangents.append(tangent / metric_length(weights, tangent))
-    along = [abs(float(special.point.tangent @ (weights * t))) for t in tangents]
-    return np.asarray(tangents[int(np.argmin(along))])
+    return tangents
 
 
 @failing_as(LocateError)

@@ -1,74 +1,68 @@
-"""The walk along a branch of periodic orbits in one direction, by pseudo-arclength."""
+"""The walk along a branch or a curve of periodic orbits in one direction, by pseudo-arclength."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from nldyn.base.arrays import TINY, Real
+from nldyn.base.arrays import SLACK, TINY, Real
 from nldyn.base.errors import FAILURES, ConvergenceError, check_types
 from nldyn.base.rows import Rows
 from nldyn.bifurcations.beyond_rigid_grazing import DIFFERENCED, SLIGHTEST
-from nldyn.bifurcations.branch_crossing import (
-    ON_CROSSING,
-    SHORTEST_CROSSING,
-    crossing_beside,
-    is_crossing,
-    lies_on_crossing,
-)
-from nldyn.bifurcations.period_doubling import flip_between, half_difference, passed_flip
+from nldyn.bifurcations.branch_crossing import SHORTEST_CROSSING
+from nldyn.bifurcations.codimension_two import is_torus, is_torus_curve
+from nldyn.bifurcations.corners import CORNER_STEP, MEETS, corner_ahead, extremes_meet
+from nldyn.bifurcations.on_curve import FARTHEST_NODE, on_chart_plane, on_plane
+from nldyn.bifurcations.period_doubling import flip_between, passed_flip
 from nldyn.bifurcations.point import BranchNode, place_of
-from nldyn.bifurcations.sign_changes import crosses
-from nldyn.bifurcations.touching import rigid_grazing, rigid_touches
-from nldyn.bifurcations.within_step import differs, passes_node
+from nldyn.bifurcations.within_step import passes_node
 from nldyn.branches.endings import Ending, StopReason
+from nldyn.branches.guards import (
+    GRAZES,
+    KINK,
+    MEETING_STEP,
+    Attempt,
+    grazes_rigid,
+    grazing_between,
+    in_the_way,
+    meets_flip,
+)
+from nldyn.branches.past_obstacles import (
+    FASTEST,
+    LONGER_CROSSINGS,
+    NEAR_NODE,
+    PAST_NODE,
+    Advance,
+    across_touch,
+    clear_of_nodes,
+    crossing_ahead,
+    over_node,
+    past_impact_at_node,
+)
 from nldyn.branches.predictor import predicted
 from nldyn.branches.step_control import ContinuationOptions
-from nldyn.orbits.bordered import FREE, OrbitFamily, correct, length_unit
-from nldyn.orbits.conditions import TOUCH, depth_row
-from nldyn.orbits.impact_phases import (
-    impact_behind_node,
-    impacts_by_segment,
-    start_far_from_impacts,
-)
+from nldyn.orbits.bordered import FREE, correct, nearest_depth
+from nldyn.orbits.conditions import UNFOLDED, BranchPointCondition, Held, depth_row
 from nldyn.orbits.multipliers import EPS
 from nldyn.orbits.orbit import Orbit
-from nldyn.orbits.shooting import (
-    BROKEN,
-    FROM_NEAR,
-    asymmetry,
-    metric_length,
-    shifts,
-)
+from nldyn.orbits.shooting import FROM_NEAR, metric_length, shifts
 
-KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes
-BY_TOLERANCE = 1.0  # asymmetry over the tolerance of the flow map: its error (0.3 at most seen)
-EQUAL_HALVES = 1e-3  # difference of an orbit's halves, over that of the orbit before
-MEETING_STEP = 1e-4  # longest step over which a doubled branch may meet the one it comes from
-LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # steps from a crossing, over `SHORTEST_CROSSING`
-FARTHEST_CROSSING = 1e-4  # distance of one from which a step may begin
-GRAZES = 1e-4  # depth over size at which a walk that cannot go on is at a grazing of a rigid stop
-NEAR_NODE = 1e-4  # rad from an impact to a phase of shooting, from which a short step may pass it
-FARTHEST_NODE = 0.3  # rad, the same for a step of any length
-FASTEST = 20.0  # rad by which an impact's phase changes at most, over the arclength
-AT_NODE = 1e-7  # rad from an impact to a phase of shooting, which are too few
-PAST_NODE = 1e-6, 1e-5, 1e-4, 1e-3  # short steps past it, in arclength
 MOST_BEHIND = 4  # points behind the last one that tell where a branch goes on
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
 RECENT = 10  # points behind a walk that it does not come back to
 SAME_PLACE = 1e-8  # distance of points that are one, relative to the orbit
 ROOM = 1.1  # times a bound: what is searched, where the bound itself is looked at later
-FARTHEST_OFF = 0.75  # of the largest angle: how far, over the step, a point may lie off the tangent
-NEAR_CROSSING = 0.1  # of the step: a crossing as near as this to its end is passed by another step
 BESIDE_RESONANCE = 1e-6  # relative distance from one, where steps are lost in rounding
 LOST_IN_ROUNDING = 1e-7  # of an orbit's size, which is far more than Newton's method leaves
 SCALES = 1e-8  # relative departure from a proportional change that is rounding
 BESIDE_STEP = 0.01  # squared distance from a step, over its own, of what it passes through
+ALONG = 1e-12  # part of a unit tangent that is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,117 +88,9 @@ class StepperState:
     count: int
 
 
-def grazes_rigid(
-    orbit: Orbit, least: float, most: float, but: Callable[[int, float], bool] | None = None
-) -> bool:
-    """Whether an impact with a rigid stop, or a near miss, is so deep.
-
-    Both bounds are shares of the orbit's size; `but` is as for `rigid_grazing`.
-    """
-    unit, touches = length_unit(orbit), rigid_touches(orbit)
-    slight = [each[:2] for each in touches if least < each[2] / unit < most]
-    return bool(slight) and (but is None or not all(but(*each) for each in slight))
-
-
-def loses_impact(orbit: Orbit) -> bool:
-    """Whether the last step of Newton's method has lost or won a slight impact."""
-    grazed = rigid_grazing(orbit)
-    if grazed is None or abs(grazed[2]) > GRAZES * length_unit(orbit) or orbit.rests:
-        return False
-    problem = orbit.problem
-    found = problem.flow.shoot(
-        problem.nodes(orbit.point), problem.phases, orbit.omega, sensitivities=False
-    )
-    return bool(found.failure) or int(found.closings.sum()) != orbit.impacts
-
-
-def grazing_between(a: Orbit, b: Orbit) -> bool:
-    """Whether two neighbouring orbits without rest differ by impacts with rigid stops.
-
-    Between them lies a grazing, where a branch has a corner, and may turn back.
-    """
-    if a.rests or b.rests:
-        return False
-    first, last = (sum(depth > 0.0 for *_, depth in rigid_touches(orbit)) for orbit in (a, b))
-    return first != last
-
-
-def rubs_all_around(orbit: Orbit) -> bool:
-    """Whether a round clearance is closed all the time, which no impact tells.
-
-    Where that begins, all of a circular whirl touches at once, and its branch has a corner.
-    """
-    if orbit.impacts or not orbit.system.round_stops:
-        return False
-    depth = orbit.trajectory.contacts_at_nodes[0]
-    return bool(depth[:, list(orbit.system.round_stops)].any())
-
-
-def _past_impact_at_node(
-    here: BranchNode, steps: Sequence[float], near: float, max_angle: float
-) -> tuple[BranchNode, float, float] | None:
-    """Next point where the phase of an impact with a rigid stop passes one of shooting, or None.
-
-    The state there jumps from that before the impact to that behind it, or back. So the step is
-    made with the states at other phases, the first of `steps` that leads on by no more than an
-    angle. The phase must be as near as told.
-    """
-    orbit, plain = here.orbit, here.family
-    before = impact_behind_node(orbit)
-    if abs(before) > near:
-        return None
-    family = plain.shot_from(start_far_from_impacts(orbit))
-    by_parameter = np.zeros(here.point.size)
-    by_parameter[-1] = math.copysign(1.0, here.tangent[-1])
-    try:
-        begin = family.unknowns(orbit)
-        first = correct(family, begin, FREE, np.abs(by_parameter))
-        if not first.converged:
-            return None
-        weights = family.metric(first.point)
-        direction = _unit(first.along, weights, by_parameter)
-        row = weights * direction
-        row /= np.linalg.norm(row)
-        for step in steps:
-            straight = first.point + step * direction
-            met = correct(family, straight, FREE, row)
-            off = metric_length(weights, met.point - straight)
-            if not met.converged or off > FARTHEST_OFF * max_angle * step:
-                continue
-            way = _unit(met.along, weights, weights * direction)
-            angle = math.acos(min(max(float(direction @ (weights * way)), -1.0), 1.0))
-            behind = impact_behind_node(met.orbit)
-            stays = (impacts_by_segment(met.orbit) == impacts_by_segment(orbit)).all()
-            if abs(behind) < AT_NODE or (stays and abs(before) > AT_NODE and before * behind > 0.0):
-                continue
-            by_parameter[-1] = math.copysign(1.0, way[-1])
-            guess = plain.unknowns(met.orbit)
-            guess[-1] = met.point[-1]
-            found = correct(
-                plain, guess, FREE, by_parameter, longest=NEAR_NODE, max_iterations=FROM_NEAR
-            )
-            if angle > max_angle or not found.converged:
-                continue
-            other = found.orbit
-            if loses_impact(other) or grazing_between(orbit, other):
-                continue
-            there = BranchNode.of(found, found.tangent(by_parameter), here.arclength + step)
-            if other.impacts == orbit.impacts and not differs(here, there):
-                return there, angle, 0.0
-    except FAILURES:
-        pass
-    return None
-
-
-def _unit(vector: Real, weights: Real, towards: Real) -> Real:
-    """A vector made as long as 1 in a metric, on the side of a row."""
-    length = metric_length(weights, vector)
-    return np.asarray(vector / (length if float(towards @ vector) >= 0.0 else -length))
-
-
 @dataclass
 class Stepper:
-    """Iterator over the points of a branch in one direction.
+    """Iterator over the points of a branch, or of a curve in two parameters, in one direction.
 
     Yields `BranchNode`s; when it ends, `stop_reason` says why. The caller may stop between any
     two points; asked for points again, the walk goes on where it was.
@@ -212,9 +98,10 @@ class Stepper:
     Parameters
     ----------
     start : BranchNode
-        First point, yielded first; its tangent gives the direction.
+        First point, yielded first; its tangent gives the direction, its condition what the orbits
+        of a curve have in common.
     limits : (float, float)
-        Values of the parameter between which to stay.
+        Values of the first parameter between which to stay; of a second one its chart tells.
     options : ContinuationOptions
         Step control.
     open_ends : (m, N + 1) array, optional
@@ -249,82 +136,87 @@ class Stepper:
             yield self.start
         while self.stride.count < self.options.max_points:
             here, step, behind = self.stride.here, self.stride.step, self.stride.behind
-            rest = self._scaled_to_rest(here, behind)
-            if rest is not None:
-                parameter = here.parameter.name
-                self.stop_reason = Ending.SCALES_TO_REST.told(parameter=parameter)
-                yield rest
+            last = self._scaled_to_rest(here, behind)
+            if last is not None:
+                yield from last
                 return
-            attempt = self._shortened(behind, here, step)
-            if attempt is None and self._last is not None:
-                self.stop_reason = self._at_range_end()
+            made = self._shortened(behind, here, step)
+            if made is None and self._last is not None:
                 yield from self._last
                 return
-            if attempt is None:
-                grazes = grazes_rigid(here.orbit, -GRAZES, GRAZES)
-                self.stop_reason = _at_grazing(here) if grazes else self.too_short()
+            if made is None:
+                self.stop_reason = self._why_short(here)
                 return
-            step, point, angle, miss = attempt
-            low, high = self.limits
-            if not low <= point.value <= high:
-                end = self._range_end(here, point, low if point.value < low else high)
-                half_step = 0.5 * step
-                passed = end is not None and grazing_between(here.orbit, end.orbit)
-                if passed and half_step >= self.options.min_step:  # behind the end may be rest
+            for a, b in pairwise((here, *made.way)):
+                last = self._ended(a, b)
+                half_step = 0.5 * made.step
+                if last and half_step >= self.options.min_step and self._grazes_before(a, last[0]):
                     self.stride = replace(self.stride, step=half_step)
-                    continue
-                self.stop_reason = self._at_range_end()
-                if end is not None:
-                    yield end
-                return
-            if passed_flip(here, point):
-                half = here.family.period // 2
-                try:
-                    end = flip_between(here, point)
-                except ConvergenceError:
-                    self.stop_reason = Ending.MEETS_HALF_PERIOD.told(
-                        period=half, place=place_of(here)
-                    )
+                    break
+                if last is not None:
+                    yield from last
                     return
-                self.stop_reason = Ending.JOINS.told(period=half, place=place_of(end))
-                yield end
-                return
-            if grazes_rigid(point.orbit, 0.0, self._slightest):
-                self.stop_reason = _at_grazing(point)
-                yield point
-                return
-            if self.closes(here, point):
-                self.stop_reason = Ending.CLOSED_BRANCH.told()
-                yield point
-                return
-            if self.stride.count % LOOKS_BACK == 0 and self._comes_back(here, point):
-                self.stop_reason = Ending.COMES_BACK.told(place=place_of(here))
-                return
-            if self.open_ends is not None and _passed(here, point, self.open_ends).any():
-                self.stop_reason = Ending.MEETS_OPEN_END.told()
-                yield point
-                return
-            bent = step <= KINK and (
-                point.orbit.impacts != here.orbit.impacts or point.orbit.system.jumps
-            )
-            bent = bent or passes_node(here, point)
-            step = self.options.next_step(step, angle, miss)
-            trail = np.vstack([here.point, here.tangent, behind])
-            behind = trail[: 0 if bent else 2 * MOST_BEHIND]
-            self.stride = StepperState(point, step, behind, self.stride.count + 1)
-            self.visited.append(point)
-            yield point
+                if b is not made.there:
+                    yield b
+            else:
+                yield self._moved(made)
         self.stop_reason = Ending.MOST_POINTS.told(points=self.options.max_points)
+
+    def _moved(self, made: Advance) -> BranchNode:
+        """The next point, from which the walk goes on."""
+        assert self.stride is not None
+        here, there, step = self.stride.here, made.there, made.step
+        bent = step <= KINK and (
+            there.orbit.impacts != here.orbit.impacts or there.orbit.system.jumps
+        )
+        bent = bent or passes_node(here, there) or bool(there.corner or made.way[0].corner)
+        trail = np.vstack([here.point, here.tangent, self.stride.behind])
+        behind = trail[: 0 if bent else 2 * MOST_BEHIND]
+        step = self.options.next_step(step, made.angle, made.miss)
+        self.stride = StepperState(there, step, behind, self.stride.count + 1)
+        self.visited.append(there)
+        return there
+
+    def _ended(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
+        """The last points of the walk if it ends in this step, and why."""
+        for ends in (
+            self._leaves_range, self._dissolves, self._meets_half_period, self._becomes_neutral,
+            self._vanishes, self._grazes, self._closed, self._came_back, self._meets_open_end,
+        ):  # fmt: skip
+            last = ends(here, there)
+            if last is not None:
+                return last
+        return None
 
     @cached_property
     def _slightest(self) -> float:
         """Slightest impact with a rigid stop that is followed, its depth over the orbit's size."""
         return SLIGHTEST if self.start.family.is_exact else DIFFERENCED
 
-    def _at_range_end(self) -> StopReason:
-        if self.start.family.in_frequency_alone:
+    @cached_property
+    def _ranges(self) -> list[tuple[float, float]]:
+        """Values of the parameters between which to stay."""
+        return [self.limits, *((c.low, c.high) for c in self.start.family.charts[1:])]
+
+    def _at_range_end(self, which: int = 0) -> StopReason:
+        family = self.start.family
+        if family.in_frequency_alone:
             return Ending.RANGE_END.told()
-        return Ending.PARAMETER_RANGE_END.told(parameter=self.start.parameter.name)
+        return Ending.PARAMETER_RANGE_END.told(parameter=family.charts[which].parameter.name)
+
+    def _why_short(self, here: BranchNode) -> StopReason:
+        """The reason to stop where no step leads on, by what the orbits have in common."""
+        condition, orbit = here.condition, here.orbit
+        if extremes_meet(here):
+            return Ending.EXTREME_VANISHES.told()
+        if isinstance(condition, BranchPointCondition) and nearest_depth(orbit) < MEETS:
+            return Ending.CORNER.told()
+        if isinstance(condition, Held) and condition.changes_extreme(orbit):
+            return Ending.OTHER_EXTREME.told()
+        near = GRAZES if condition is FREE else max(GRAZES, self._slightest)
+        if grazes_rigid(orbit, -near, near, condition):
+            return _at_grazing(here)
+        return self.too_short()
 
     def too_short(self) -> StopReason:
         """The reason to stop where no step leads on."""
@@ -345,40 +237,73 @@ class Stepper:
         self.stride = StepperState(here, step, behind, self.stride.count + 1)
         self.visited.append(here)
 
-    def _shortened(
-        self, behind: Real, here: BranchNode, step: float
-    ) -> tuple[float, BranchNode, float, float] | None:
-        """The longest step up to `step` that leads to a next point, with what `_advance` gives."""
-        tried, jumps = False, here.orbit.system.jumps
+    def _shortened(self, behind: Real, here: BranchNode, step: float) -> Advance | None:
+        """The longest step up to `step` that leads to a next point."""
+        free, jumps = here.condition is FREE, here.orbit.system.jumps
+        looked = bool(here.corner)
+        nearest = SHORTEST_CROSSING if free else CORNER_STEP
         while step >= self.options.min_step:
-            attempt = self._advance(behind, here, step)
-            if attempt is None and step <= KINK:
-                attempt = self._across_touch(here, step)
-            elif attempt is None and jumps:
-                attempt = _past_impact_at_node(
+            made = self._advance(behind, here, step, looked=looked)
+            if not free:
+                made = self._clear_of_nodes(made, here, step, looked)
+            elif made is None and step <= KINK:
+                made = self._across_touch(here, step)
+            elif made is None and jumps:
+                made = past_impact_at_node(
                     here, (step,), min(FARTHEST_NODE, FASTEST * step), self.options.max_angle
                 )
-            if attempt is None and step <= MEETING_STEP and self._met == 2.0 * step:
+            if made is None and step <= MEETING_STEP and self._met == 2.0 * step:
                 step, self._met = self._met, 0.0  # shorter, it ends too near to the flip
-                attempt = self._advance(behind, here, step, step)
-            if attempt is not None:
-                return step, *attempt
+                made = self._advance(behind, here, step, step)
+            if made is not None:
+                return made
             self._last = self._limit_ahead(here, step)
             if self._last is not None:
                 return None
             step *= 0.5
-            if not tried and self.options.min_step <= step < SHORTEST_CROSSING:
-                tried = True
-                attempt = _past_impact_at_node(here, PAST_NODE, NEAR_NODE, self.options.max_angle)
-                attempt = attempt or self._past_crossing(here)
-                if attempt is not None:
-                    return attempt[0].arclength - here.arclength, *attempt
+            if not looked and self.options.min_step <= step < nearest:
+                looked = True
+                made = self._past_obstacle(here)
+                if made is not None:
+                    return made
         return None
 
+    def _past_obstacle(self, here: BranchNode) -> Advance | None:
+        """Next point from one beside which an impact, a crossing or a corner is in the way."""
+        options = self.options
+        if here.condition is FREE:
+            made = past_impact_at_node(here, PAST_NODE, NEAR_NODE, options.max_angle)
+            made = made or self._past_crossing(here)
+            return made and made._replace(step=made.there.arclength - here.arclength)
+        way = corner_ahead(here, options.grazing_step, options.max_step)
+        if not way:
+            return None
+        *_, before, last = (here, *way)
+        step = last.arclength - before.arclength
+        return Advance(tuple(way), step, options.max_angle, options.max_miss)
+
+    def _clear_of_nodes(
+        self, made: Advance | None, here: BranchNode, step: float, looked: bool
+    ) -> Advance | None:
+        """A step along a curve, or one by states at other phases, if that ends too near to one."""
+        if made is not None and clear_of_nodes(made.there):
+            return made
+        none = np.empty((0, here.tangent.size))
+
+        def straight_on(shot: BranchNode, length: float) -> Advance | None:
+            return self._advance(none, shot, length, looked=looked)
+
+        return over_node(here, step, straight_on) or made
+
     def _advance(
-        self, behind: Real, here: BranchNode, step: float, crossing: float = 0.0
-    ) -> tuple[BranchNode, float, float] | None:
-        """Next point, its angle to this one and its relative distance from the predictor.
+        self,
+        behind: Real,
+        here: BranchNode,
+        step: float,
+        crossing: float = 0.0,
+        looked: bool = False,
+    ) -> Advance | None:
+        """Next point at a distance, if nothing is in the way.
 
         None when the step must be shorter, as it must be to cross another branch or to meet it:
         up to `SHORTEST_CROSSING` or `MEETING_STEP`, or `crossing` if that is longer.
@@ -393,10 +318,10 @@ class Stepper:
         found = correct(
             family,
             guess,
-            FREE,
+            here.condition,
             row,
             float(row @ straight),
-            longest=ROOM * self.options.max_miss * step if step > KINK else 2.0 * step,
+            longest=self._longest(here, step),
             max_iterations=FROM_NEAR,
             like=here.orbit.motion,
             aim=cubic,
@@ -404,58 +329,23 @@ class Stepper:
             closings=self._closings(here.orbit, step),
             turn=math.cos(ROOM * self.options.max_angle) if step > KINK else 0.0,
         )
-        if not found.converged:
-            self._obstacle = found.failure
-            if found.solution is not None and found.step < math.inf:
-                self._obstacle += f", last relative step {found.step:.1e}"
+        attempt = Attempt(
+            here, step, direction, straight, cubic, found, self.options, crossing, looked
+        )
+        obstacle = in_the_way(attempt)
+        if obstacle is not None:
+            guard, self._obstacle = obstacle
+            if guard is meets_flip:
+                self._met = step
             return None
-        self._obstacle = "what Newton's method finds is not the next point of the branch"
-        if _jumped(family, here.point, straight, found.point):
-            return None
-        orbit = found.orbit
-        if loses_impact(orbit) or grazing_between(here.orbit, orbit):
-            return None
-        miss = metric_length(weights, found.point - cubic) / step
-        # a linear stop that is touched bends the branch; a force that jumps does where the phase of
-        # a switch passes one of shooting, as the state there has a corner
-        if step <= KINK and miss < 1.0:
-            if orbit.impacts != here.orbit.impacts and grazes_rigid(here.orbit, -GRAZES, GRAZES):
-                return None  # the branch with the impact and that without meet in a corner
-            if (
-                orbit.system.jumps
-                or orbit.impacts != here.orbit.impacts
-                or rubs_all_around(orbit) != rubs_all_around(here.orbit)
-            ):
-                tangent = found.tangent(direction)
-                return BranchNode.of(found, tangent, here.arclength + step), 0.0, 0.0
-        if miss > self.options.max_miss:
-            return None
-        # a curve that turns by max_angle leaves its tangent by half of that: a longer correction
-        # has landed on another branch
-        off = metric_length(weights, found.point - straight)
-        if off > FARTHEST_OFF * self.options.max_angle * step:
-            return None
-        tangent = found.tangent(direction)
-        cosine = float(direction @ (weights * tangent)) / metric_length(weights, tangent)
-        angle = math.acos(min(max(cosine, -1.0), 1.0))
-        if angle > self.options.max_angle:
-            return None
-        if step > self.options.grazing_step and orbit.impacts != here.orbit.impacts:
-            return None
-        meets = passed_flip(here, found)
-        if meets and step > max(MEETING_STEP, crossing):
-            self._met = step
-            return None
-        point = BranchNode.of(found, tangent, here.arclength + step)
-        if (
-            not meets
-            and crosses(here, point)
-            and (step > max(crossing, SHORTEST_CROSSING) or not is_crossing(found))
-        ):
-            return None
-        if lies_on_crossing(found, min(NEAR_CROSSING * step, ON_CROSSING)):
-            return None
-        return point, angle, miss
+        bends = (0.0, 0.0) if attempt.kinked else (attempt.angle, attempt.miss)
+        return Advance((attempt.there,), step, *bends)
+
+    def _longest(self, here: BranchNode, step: float) -> float:
+        """How far Newton's method may step at first, but along a curve, whose slopes are coarse."""
+        if here.condition is not FREE:
+            return math.inf
+        return ROOM * self.options.max_miss * step if step > KINK else 2.0 * step
 
     def _closings(self, orbit: Orbit, step: float) -> int:
         """How often stops close on the next orbit, or -1 for any number.
@@ -464,41 +354,20 @@ class Stepper:
         """
         return orbit.impacts if step > self.options.grazing_step and not orbit.rests else -1
 
-    def _across_touch(
-        self, here: BranchNode, step: float
-    ) -> tuple[BranchNode, float, float] | None:
-        """Next point on the other side of a grazing point, as `_advance` gives it, or None.
-
-        A stiff stop may bend the branch by more than a right angle within 1e-8, back from every
-        plane across its tangent. The depth of the touch rises or falls all the way, and where it is
-        held the stop's force hardly depends on the orbit.
-        """
+    def _across_touch(self, here: BranchNode, step: float) -> Advance | None:
+        """Next point on the other side of a grazing point, or None."""
         if self._depth_row is None or self._depth_row[0] is not here:
             self._depth_row = here, depth_row(here)
         row = self._depth_row[1]
-        if row is None:
-            return None
-        family = here.family
-        weights = family.metric(here.point)
-        guess = here.point + step * here.tangent / metric_length(weights, here.tangent)
-        found = correct(family, guess, FREE, row, longest=2.0 * KINK, max_iterations=FROM_NEAR)
-        if not found.converged or _jumped(family, here.point, guess, found.point):
-            return None
-        length = metric_length(weights, found.point - here.point)
-        if length > KINK or found.orbit.impacts == here.orbit.impacts:
-            return None
-        tangent = found.tangent(here.tangent)
-        if float(row @ tangent) * float(row @ here.tangent) < 0.0:
-            tangent = -tangent
-        return BranchNode.of(found, tangent, here.arclength + length), 0.0, 0.0
+        return None if row is None else across_touch(here, step, row)
 
-    def _past_crossing(self, here: BranchNode) -> tuple[BranchNode, float, float] | None:
+    def _past_crossing(self, here: BranchNode) -> Advance | None:
         """Next point from one beside which branches cross, or None.
 
         Its place is some mixture of theirs, and the next orbits may be so ill conditioned that
         Newton's method does not find them: longer steps lead on from the crossing itself.
         """
-        crossing = _crossing_ahead(here)
+        crossing = crossing_ahead(here)
         if crossing is None:
             return None
         obstacle = self._obstacle
@@ -506,72 +375,163 @@ class Stepper:
         none = np.empty((0, crossing.tangent.size))
         for factor in LONGER_CROSSINGS:
             length = back + factor * SHORTEST_CROSSING
-            attempt = self._advance(none, crossing, length, length)
-            if attempt is not None:
-                return attempt
+            made = self._advance(none, crossing, length, length)
+            if made is not None:
+                return made
         self._obstacle = obstacle
         return None
 
-    def _range_end(self, a: BranchNode, b: BranchNode, end: float) -> BranchNode | None:
-        """Point of the branch exactly at an end of the range."""
-        p = a.family.charts[0].coordinate(end)
-        pa, pb = a.point[-1], b.point[-1]
-        if pa == p:
-            return None
-        share = (p - pa) / (pb - pa)
-        guess = (1.0 - share) * a.point + share * b.point
-        row = np.zeros(guess.size)
-        row[-1] = 1.0
-        guess[-1] = p
-        found = correct(a.family, guess, FREE, row, like=a.orbit.motion)
-        if not found.converged:
-            return None
-        length = a.arclength + share * (b.arclength - a.arclength)
-        return BranchNode.of(found, found.tangent(a.tangent), length)
+    def _grazes_before(self, here: BranchNode, end: BranchNode) -> bool:
+        """Whether a rigid stop is grazed before the end of the range, behind which may be rest."""
+        if self.stop_reason.ending not in (Ending.RANGE_END, Ending.PARAMETER_RANGE_END):
+            return False
+        return not here.family.passages and grazing_between(here.orbit, end.orbit)
 
-    def _scaled_to_rest(self, here: BranchNode, behind: Real) -> BranchNode | None:
-        """Rest, at the end of a range at zero to which orbits shrink in proportion, or None.
-
-        They would do so for ever on the scale of their own size.
-        """
-        chart = here.family.charts[0]
-        towards = chart.low == 0.0 == self.limits[0] and here.tangent[-1] < 0.0
-        if not (towards and len(behind)):
+    def _leaves_range(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
+        """The point exactly at an end of a range; none if the walk stands there."""
+        passed = []
+        pairs = zip(_values(here), _values(there), self._ranges, strict=True)
+        for which, (a, b, (low, high)) in enumerate(pairs):
+            if not low <= b <= high:
+                limit = low if b < low else high
+                passed.append((1.0 if a == b else (limit - a) / (b - a), which, limit))
+        if not passed:
             return None
-        if not (scales(behind[0], behind[1]) and scales(here.point, here.tangent)):
-            return None
-        row = np.zeros(here.point.size)
-        row[-1] = 1.0
-        found = correct(here.family, np.zeros(here.point.size), FREE, row)
-        if not found.converged:
-            return None
-        length = metric_length(here.family.metric(here.point), here.point)
-        return BranchNode.of(found, found.tangent(here.tangent), here.arclength + length)
+        share, which, limit = min(passed)
+        self.stop_reason = self._at_range_end(which)
+        if share <= SLACK:
+            return []
+        end = on_chart_plane(here, there, which, limit)
+        if end is None and not here.family.in_frequency_alone:
+            name = here.family.charts[which].parameter.name
+            self.stop_reason = Ending.NO_ORBIT_AT_RANGE_END.told(parameter=name)
+        return [] if end is None else [end]
 
     def _limit_ahead(self, here: BranchNode, step: float) -> list[BranchNode] | None:
-        """The point at the end of the range, if a failed step would have passed it.
+        """The point at the end of a range, if a failed step would have passed it.
 
         Behind the end of the range of a parameter there may be no systems: no restitution above 1,
         no damping below zero. No point if the walk is there.
         """
-        if here.family.in_frequency_alone:
+        family = here.family
+        if family.in_frequency_alone:
             return None
-        weights, slope = here.family.metric(here.point), float(here.tangent[-1])
-        limit = self.limits[slope > 0.0]
-        p = here.family.charts[0].coordinate(limit)
-        ahead = (p - float(here.point[-1])) / (slope or TINY)
-        if here.value == limit or not 0.0 < ahead <= step:
-            return [] if here.value == limit else None
-        straight = here.point + ahead * here.tangent
-        straight[-1] = p
-        row = np.zeros(straight.size)
-        row[-1] = 1.0
-        found = correct(here.family, straight, FREE, row)
-        off = metric_length(weights, found.point - straight)
-        if not found.converged or off > self.options.max_angle * ahead:
+        weights, values = family.metric(here.point), _values(here)
+        for which, (chart, limits) in enumerate(zip(family.charts, self._ranges, strict=True)):
+            place = family.n_states + which
+            slope = float(here.tangent[place])
+            limit = limits[slope > 0.0]
+            if abs(slope) > ALONG and (values[which] - limit) * slope >= 0.0:
+                self.stop_reason = self._at_range_end(which)
+                return []
+            coordinate = chart.coordinate(limit)
+            ahead = (coordinate - float(here.point[place])) / (slope or TINY)
+            if not 0.0 < ahead <= step:
+                continue
+            way = ahead * here.tangent
+            end = on_plane(here, way, ahead, which, coordinate)
+            if end is None or (not family.passages and grazing_between(here.orbit, end.orbit)):
+                continue
+            off = metric_length(weights, end.point - here.point - way)
+            if off <= self.options.max_angle * ahead:
+                self.stop_reason = self._at_range_end(which)
+                return [end]
+        return None
+
+    def _scaled_to_rest(self, here: BranchNode, behind: Real) -> list[BranchNode] | None:
+        """What ends the walk where orbits shrink in proportion to parameters whose ranges end at 0.
+
+        They would do so for ever on the scale of their own size. It is rest, but where no orbit of
+        a curve is found there; None if they do not.
+        """
+        family, charts, n = here.family, here.family.charts, here.family.n_states
+        lows = [low for low, _ in self._ranges]
+        at_zero = [place for place, chart in enumerate(charts) if 0.0 == chart.low == lows[place]]
+        if not (at_zero and len(behind)) or here.tangent[n + at_zero[-1]] >= 0.0:
             return None
-        end = BranchNode.of(found, found.tangent(here.tangent), here.arclength + ahead)
-        return None if grazing_between(here.orbit, end.orbit) else [end]
+        scaled = np.arange(here.point.size) < n
+        scaled[[n + place for place in at_zero]] = True
+        secant = here.point - behind[0]
+        secant /= metric_length(family.metric(here.point), secant)
+        held = float(np.abs(secant[~scaled]).max(initial=0.0))
+        if held > SCALES or not scales(here.point[scaled], secant[scaled]):
+            return None
+        way = np.where(scaled, -here.point, 0.0)
+        length = metric_length(family.metric(here.point), way)
+        rest = on_plane(here, way, length, at_zero[-1], 0.0)
+        if rest is None and here.condition is FREE:
+            return None
+        names = " and ".join(charts[place].parameter.name for place in at_zero)
+        self.stop_reason = Ending.SCALES_TO_REST.told(parameter=names)
+        return [] if rest is None else [rest]
+
+    def _dissolves(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
+        """A branch point that is none any more."""
+        unfolded = isinstance(here.condition, BranchPointCondition)
+        if not (unfolded and abs(float(there.point[-1])) > UNFOLDED):
+            return None
+        self.stop_reason = Ending.DISSOLVED.told()
+        return []
+
+    def _meets_half_period(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
+        """The flip at which a doubled branch ends; a curve ends before it."""
+        if not passed_flip(here, there):
+            return None
+        half = here.orbit.period // 2
+        if here.condition is not FREE:
+            self.stop_reason = Ending.MEETS_HALF_PERIODS.told(period=half)
+            return []
+        try:
+            end = flip_between(here, there)
+        except ConvergenceError:
+            self.stop_reason = Ending.MEETS_HALF_PERIOD.told(period=half, place=place_of(here))
+            return []
+        self.stop_reason = Ending.JOINS.told(period=half, place=place_of(end))
+        return [end]
+
+    def _becomes_neutral(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
+        """A curve of Neimark-Sacker points whose pair has become real."""
+        if not is_torus_curve(here.condition) or is_torus(there.orbit.multipliers):
+            return None
+        self.stop_reason = Ending.RESONANCE.told()
+        return [there]
+
+    def _vanishes(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
+        """A curve of grazings whose extreme meets the next one of the other kind."""
+        if not (extremes_meet(here) and extremes_meet(there)):
+            return None
+        self.stop_reason = Ending.EXTREME_VANISHES.told()
+        return [there]
+
+    def _grazes(self, _: BranchNode, there: BranchNode) -> list[BranchNode] | None:
+        """An impact with a rigid stop too slight to be followed."""
+        if not grazes_rigid(there.orbit, 0.0, self._slightest, there.condition):
+            return None
+        self.stop_reason = _at_grazing(there)
+        return [there]
+
+    def _closed(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
+        """The point behind the start, where the walk has come round."""
+        if not self.closes(here, there):
+            return None
+        free = here.condition is FREE
+        self.stop_reason = (Ending.CLOSED_BRANCH if free else Ending.CLOSED_CURVE).told()
+        return [there]
+
+    def _came_back(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
+        """Where the walk has been before."""
+        assert self.stride is not None
+        if self.stride.count % LOOKS_BACK or not self._comes_back(here, there):
+            return None
+        self.stop_reason = Ending.COMES_BACK.told(place=place_of(here))
+        return []
+
+    def _meets_open_end(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
+        """The point behind the open end of another branch."""
+        if self.open_ends is None or not _passed(here, there, self.open_ends).any():
+            return None
+        self.stop_reason = Ending.MEETS_OPEN_END.told()
+        return [there]
 
     def closes(self, a: BranchNode, b: BranchNode) -> bool:
         """Whether the walk from a to b passes the start again, in the same direction.
@@ -608,7 +568,7 @@ class Stepper:
                 continue
             row = weights * tangent / np.linalg.norm(weights * tangent)
             share = float((place - a.point) @ (weights * step)) / length2
-            found = correct(a.family, a.point + share * step, FREE, row, float(row @ place))
+            found = correct(a.family, a.point + share * step, a.condition, row, float(row @ place))
             if found.converged and metric_length(weights, found.point - place) < SAME_PLACE:
                 return True
         return False
@@ -622,6 +582,11 @@ class Stepper:
 
 def _at_grazing(point: BranchNode) -> StopReason:
     return Ending.GRAZES_RIGID.told(place=place_of(point, 9))
+
+
+def _values(node: BranchNode) -> list[float]:
+    """Values of the parameters."""
+    return [node.value, *node.values.tolist()[1:]]
 
 
 def scales(point: Real, tangent: Real) -> bool:
@@ -640,28 +605,13 @@ def _resonance_beside(orbit: Orbit) -> float | None:
 def _rounding(here: BranchNode) -> float:
     """How far rounding moves an orbit, over its size: ε by the condition of what closes it."""
     weights = np.sqrt(here.family.metric(here.point))
+    of_states = weights[: here.family.n_states, None]
     try:
         closing = here.family.at(here.point).jacobian
-        values = np.linalg.svd(weights[:-1, None] * closing / weights, compute_uv=False)
+        values = np.linalg.svd(of_states * closing / weights, compute_uv=False)
     except FAILURES:
         return 0.0
     return EPS * float(values[0] / max(values[-1], TINY))
-
-
-def _crossing_ahead(here: BranchNode) -> BranchNode | None:
-    """Where another branch crosses that of a point right beside there, on its tangent.
-
-    It may lie a little behind.
-    """
-    crossing = crossing_beside(here)
-    if crossing is None:
-        return None
-    way = crossing.point - here.point
-    weights = here.family.metric(here.point)
-    if metric_length(weights, way) > FARTHEST_CROSSING:
-        return None
-    ahead = float(way @ (weights * here.tangent)) / metric_length(weights, here.tangent)
-    return BranchNode.of(crossing, here.tangent, here.arclength + ahead)
 
 
 def _passed(a: BranchNode, b: BranchNode, places: Real) -> NDArray[np.bool_]:
@@ -683,32 +633,3 @@ def _passed(a: BranchNode, b: BranchNode, places: Real) -> NDArray[np.bool_]:
         inside = (along >= 0.0) & (along <= length2)
         passed[near] = inside & ((off * off) @ weights < BESIDE_STEP * length2)
     return passed
-
-
-def _jumped(family: OrbitFamily, here: Real, guess: Real, there: Real) -> bool:
-    """Whether a step has landed on an orbit shifted by some excitation periods, or on half of one.
-
-    Where it is shifted, some other shift of it lies nearer to where the step began. Only through a
-    flip the halves change places steadily, as the tangent foretells; not in a jump. Nor does a
-    doubled branch go on along the one that it comes from, nor one of broken symmetry along the
-    symmetric one.
-    """
-    problem = family.problem
-    broken = asymmetry(problem, here)
-    least = max(BROKEN, BY_TOLERANCE * problem.flow.options.rtol)
-    if broken > least and asymmetry(problem, there) < EQUAL_HALVES * broken:
-        return True
-    if problem.period == 1:
-        return False
-    apart, *others = (float(np.linalg.norm((p - here)[:-1])) for p in shifts(problem, there))
-    if problem.period % 2 == 0:  # half its period: a flip, below
-        del others[problem.period // 2 - 1]
-    if any(other < apart for other in others):
-        return True
-    if problem.period % 2:
-        return False
-    a, g, b = (half_difference(family, point) for point in (here, guess, there))
-    before, after = float(np.linalg.norm(a)), float(np.linalg.norm(b))
-    if after < EQUAL_HALVES * before:  # on the branch of half the period
-        return True
-    return float(a @ b) < 0.0 and float(np.linalg.norm(b - g)) > 0.5 * max(before, after)

@@ -17,8 +17,9 @@ from nldyn.bifurcations.events import Event, Events, checked_events, events_alon
 from nldyn.bifurcations.kinds import KINDS
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.at_frequency import Places, crossings, passes
-from nldyn.branches.endings import Ending, StopReasons, has_ending
+from nldyn.branches.endings import StopReasons
 from nldyn.branches.tables import Part, point_columns, special_columns, to_pandas, to_xarray
+from nldyn.orbits.bordered import FREE
 from nldyn.orbits.orbit import Orbit, same_orbit
 from nldyn.system.chart import FREQUENCY, label_of, parameter_name, told_value
 from nldyn.system.parameters import Parameter
@@ -83,7 +84,7 @@ class Course:
     Parameters
     ----------
     limits : (float, float)
-        Values of the parameter between which to stay.
+        Values of the parameter between which to stay, of several the first.
     options : ContinuationOptions
         Step control.
     open_ends : (m, N + 1) array
@@ -98,6 +99,8 @@ class Course:
         How the ways backward and forward would go on; None for a way that there is not.
     events : tuple of Event
         What else its special points are, searched when the branch is whole.
+    further : tuple of (float, float)
+        Values of further parameters between which to stay.
     """
 
     limits: tuple[float, float]
@@ -109,11 +112,14 @@ class Course:
     notes_before: int = 0
     ends: tuple[WalkEnd | None, WalkEnd | None] = (None, None)
     events: tuple[Event, ...] = ()
+    further: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Branch:
     """A curve of periodic orbits of one period multiple, in the frequency or another parameter.
+
+    So is one in two parameters whose orbits meet a condition, see `nldyn.curves.Curve`.
 
     Parameters
     ----------
@@ -183,7 +189,7 @@ class Branch:
     @property
     def closed(self) -> bool:
         """Whether the branch ends where it began: its last point lies just beyond its first."""
-        return has_ending(self.stop_reasons, Ending.CLOSED_BRANCH)
+        return any(reason.closes for reason in self.stop_reasons)
 
     @property
     def stop_reason(self) -> str:
@@ -253,6 +259,12 @@ class Branch:
                 found.append(point.orbit)
         return found
 
+    @property
+    def bifurcations(self) -> list[SpecialPoint]:
+        """The special points that are no events."""
+        on_curve = self.nodes[0].condition is not FREE
+        return [s for s in self.special_points if on_curve or s.kind in KINDS]
+
     def with_events(self, events: Events) -> Branch:
         """The same branch, whose special points beside bifurcations and grazings are some events.
 
@@ -272,7 +284,7 @@ class Branch:
             For events that make no sense.
         """
         chosen = checked_events(events)
-        special, notes = [s for s in self.special_points if s.kind in KINDS], list(self.notes)
+        special, notes = self.bifurcations, list(self.notes)
         for event in chosen:
             found, lost = events_along(event, self.nodes, closed=self.closed)
             special += found

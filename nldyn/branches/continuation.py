@@ -19,7 +19,6 @@ from nldyn.bifurcations.branch_crossing import (
 )
 from nldyn.bifurcations.chord import CROSSING_ERROR
 from nldyn.bifurcations.events import Events, check_values, checked_events
-from nldyn.bifurcations.kinds import KINDS
 from nldyn.bifurcations.normal_form_coefficients import correct_across
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.at_frequency import check_requested, requested
@@ -29,7 +28,7 @@ from nldyn.branches.branch import (
 )
 from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_at
 from nldyn.branches.endings import Ending, StopReason, StopReasons
-from nldyn.branches.leg import Leg, LegBuilder
+from nldyn.branches.leg import Leg, LegBuilder, Progress
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.axis import chart_over
@@ -215,15 +214,27 @@ def extended(
         events=course.events if events is None else checked_events(events),
     )
     check_values(new.events, branch.points[0])
-    family = branch.nodes[0].family
-    branch = on_family(branch, replace(family, charts=(chart,)))
-    with checkpoint_at(checkpoint, family.system) as kept:
-        known = kept.branch_from(branch.nodes[course.start], new, course)
-        if known is not None and known.course is not None and known.course.limits == new.limits:
-            branch, course = known, known.course  # this very extension was begun before
-        forward, backward = split(branch, course)
-        start = branch.nodes[course.start]
-        return complete(branch.name, forward, backward, start, new, progress, kept)
+    with checkpoint_at(checkpoint, branch.nodes[0].family.system) as kept:
+        return going_on(branch, (chart,), new, progress, kept)
+
+
+def going_on(
+    branch: Branch,
+    charts: tuple[Chart, ...],
+    new: Course,
+    progress: Progress | None,
+    checkpoint: Checkpoint,
+) -> Branch:
+    """A branch or curve finished, or followed through wider ranges on the scale that it has."""
+    course = branch.course
+    assert course is not None
+    branch = on_charts(branch, charts)
+    known = checkpoint.branch_from(branch.nodes[course.start], new, course)
+    if known is not None and known.course is not None and known.course.limits == new.limits:
+        branch, course = known, known.course  # this very extension was begun before
+    forward, backward = split(branch, course)
+    start = branch.nodes[course.start]
+    return complete(branch.name, forward, backward, start, new, progress, checkpoint)
 
 
 def _chart_beyond(branch: Branch, limits: tuple[float, float]) -> Chart:
@@ -240,11 +251,14 @@ def _chart_beyond(branch: Branch, limits: tuple[float, float]) -> Chart:
     return wider
 
 
-def on_family(branch: Branch, family: OrbitFamily) -> Branch:
-    """The same branch with a family of the same scale."""
+def on_charts(branch: Branch, charts: tuple[Chart, ...]) -> Branch:
+    """The same branch with other ranges on the same scales."""
+    families: dict[int, OrbitFamily] = {}
 
     def moved(node: BranchNode) -> BranchNode:
-        return replace(node, family=family)
+        family = node.family
+        known = families.setdefault(id(family), replace(family, charts=charts))
+        return replace(node, family=known)
 
     special = tuple(replace(s, point=moved(s.point)) for s in branch.special_points)
     return replace(
@@ -262,7 +276,7 @@ def complete(
     backward: Leg | None,
     start: BranchNode,
     course: Course,
-    progress: Callable[[float], None] | None,
+    progress: Progress | None,
     checkpoint: Checkpoint,
     ahead: Ahead | None = None,
 ) -> Branch:
@@ -312,7 +326,7 @@ def complete(
     if forward is None:
         offer_leg(ahead, start.reversed(), course, first=True)
     forward = walked(forward, start, lambda leg: join(name, leg, backward, course) if leg else None)
-    if forward.reason.ending is Ending.CLOSED_BRANCH:
+    if forward.reason.closes:
         ahead.forget(leg_key(start.reversed(), course))
         backward = None
     else:
@@ -462,10 +476,12 @@ def goes_on(leg: Leg, course: Course) -> bool:
         return True
     if end is None:
         return False
-    if ending in (Ending.RANGE_END, Ending.PARAMETER_RANGE_END):
-        low, high = course.limits
-        slack = SLACK * max(abs(low), abs(high))
-        return low + slack < leg.nodes[-1].value < high - slack
+    if ending in (Ending.RANGE_END, Ending.PARAMETER_RANGE_END, Ending.NO_ORBIT_AT_RANGE_END):
+        values = [leg.nodes[-1].value, *leg.nodes[-1].values.tolist()[1:]]
+        return all(
+            low + SLACK * max(abs(low), abs(high)) < value < high - SLACK * max(abs(low), abs(high))
+            for value, (low, high) in zip(values, (course.limits, *course.further), strict=True)
+        )
     if ending is Ending.MOST_POINTS:
         return options.max_points > end.count
     if ending is Ending.SHORT_STEP:
@@ -476,8 +492,7 @@ def goes_on(leg: Leg, course: Course) -> bool:
 def join(name: str, forward: Leg, backward: Leg | None, course: Course) -> Branch:
     """Branch of two legs from one start."""
     if backward is None:
-        closed = forward.reason.ending is Ending.CLOSED_BRANCH
-        first = forward.reason if closed else Ending.NOT_FINISHED.told()
+        first = forward.reason if forward.reason.closes else Ending.NOT_FINISHED.told()
         backward = Leg([forward.nodes[0]], [], [], first, None)
     forward, backward = _without_repeat(forward, backward)
     branch = make_branch(
@@ -523,7 +538,7 @@ def _without_first(leg: Leg) -> Leg:
 def split(branch: Branch, course: Course) -> tuple[Leg, Leg | None]:
     """The legs of which a branch was joined: forward and, if it was begun, backward."""
     nodes, notes = branch.nodes, branch.notes
-    special = [s for s in branch.special_points if s.kind in KINDS]
+    special = branch.bifurcations
     start, specials, lines = course.start, course.special_points_before, course.notes_before
     first, last = branch.stop_reasons
     forward = Leg(

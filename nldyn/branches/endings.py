@@ -109,6 +109,11 @@ class StopReason(str):
         """Whether the branch goes on behind its end."""
         return self.ending in BROKEN_OFF
 
+    @property
+    def closes(self) -> bool:
+        """Whether the branch or curve ends where it began."""
+        return self.ending in (Ending.CLOSED_BRANCH, Ending.CLOSED_CURVE)
+
 
 BROKEN_OFF = (
     Ending.SHORT_STEP, Ending.MOST_POINTS, Ending.FAILS, Ending.GROWS, Ending.LOST_IN_ROUNDING,

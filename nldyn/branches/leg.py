@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from operator import attrgetter
+from typing import Any
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES
@@ -19,6 +20,7 @@ from nldyn.bifurcations.beyond_rigid_grazing import (
 )
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossing, without_repeats
 from nldyn.bifurcations.chord import Chord
+from nldyn.bifurcations.marks import marks_between
 from nldyn.bifurcations.point import BranchNode, SpecialPoint, place_of
 from nldyn.bifurcations.touching import grazes_exactly, rigid_grazing, rigid_touches
 from nldyn.bifurcations.within_step import insert_dip, special_points_between
@@ -26,7 +28,7 @@ from nldyn.branches.arclength import Stepper, StepperState
 from nldyn.branches.branch import WalkEnd
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.step_control import ContinuationOptions
-from nldyn.orbits.bordered import Solved, length_unit
+from nldyn.orbits.bordered import FREE, Solved, length_unit
 from nldyn.orbits.conditions import grazing_beside
 from nldyn.orbits.orbit import Orbit, same_orbit
 from nldyn.system.chart import FREQUENCY, told_value
@@ -42,6 +44,9 @@ LONG_SERIES = 10  # impacts before a grazing, each slower than the last, that ma
 SHORT_SERIES = 3  # the same where the branch is followed no farther
 SLOWEST = 1.2e-3  # depth over size of the last of them: those behind are hardly told apart
 DETOUR_STEPS, DETOUR_GROWTH = 64.0, 8.0  # its first steps in the one it replaces, its longest
+
+
+Progress = Callable[[Any], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +121,7 @@ class LegBuilder:
 
     def follow(
         self,
-        progress: Callable[[float], None] | None = None,
+        progress: Progress | None = None,
         keep: Callable[[], None] | None = None,
     ) -> Leg:
         """Walk to the end.
@@ -124,7 +129,7 @@ class LegBuilder:
         Parameters
         ----------
         progress : callable, optional
-            Called with the parameter's value at every point.
+            Called with the parameter's value at every point, of several with all of them.
         keep : callable, optional
             Called after every point, when `so_far` tells of it.
         """
@@ -138,14 +143,14 @@ class LegBuilder:
                 self.walk.stop_reason = Ending.FAILS.told(place=place, obstacle=error)
                 break
             if progress is not None:
-                progress(self.nodes[-1].value)
+                progress(_told(self.nodes[-1]))
         ending = self.walk.stop_reason.ending
         if ending is Ending.COMES_BACK:
             self.notes.append(self.walk.stop_reason)
         special = self.special_points
         if ending is Ending.JOINS:
             special = [s for s in special if not self._is_flip_at_end(s)]
-        elif ending is Ending.CLOSED_BRANCH:  # the last step leads beyond the start
+        elif self.walk.stop_reason.closes:  # the last step leads beyond the start
             special = self._once_around()
             last = self.nodes.pop()  # a dip may have put others there
             self.nodes = [*(p for p in self.nodes if not self._is_repeated(p)), last]
@@ -153,15 +158,13 @@ class LegBuilder:
         notes = [*self.notes, *not_told_apart(special)]
         return Leg(self.nodes, special, notes, self.walk.stop_reason, end)
 
-    def _follow(
-        self, progress: Callable[[float], None] | None, keep: Callable[[], None] | None
-    ) -> None:
+    def _follow(self, progress: Progress | None, keep: Callable[[], None] | None) -> None:
         """Walk until the walk ends, and search all that it has passed."""
         for point in self.walk:
             self.nodes.append(point)
             if progress is not None:
-                progress(point.value)
-            if len(self.nodes) - self._piece > 2:
+                progress(_told(point))
+            if self._free and len(self.nodes) - self._piece > 2:
                 insert_dip(self.nodes, len(self.nodes) - 2)
             regular = self.walk.stride is not None and self.walk.stride.here is point
             self._search(len(self.nodes) - 2, closely=regular)
@@ -177,7 +180,7 @@ class LegBuilder:
         Either way the grazing is a special point.
         """
         walk, last = self.walk, self.nodes[-1]
-        if walk.stop_reason.ending is not Ending.GRAZES_RIGID:
+        if not self._free or walk.stop_reason.ending is not Ending.GRAZES_RIGID:
             return False
         grazing = _grazing_at_end(self.nodes)
         if self._piece and same_orbit(grazing.orbit, self.special_points[-1].orbit):
@@ -249,7 +252,7 @@ class LegBuilder:
         passed = [
             special.point.arclength
             for special in self.special_points
-            if special.kind == "GR" and grazes_exactly(special.orbit)
+            if self._free and special.kind == "GR" and grazes_exactly(special.orbit)
         ]
         return bisect(self.nodes, passed[-1], key=attrgetter("arclength")) if passed else 0
 
@@ -267,6 +270,11 @@ class LegBuilder:
         """Whether a point of a closed branch lies where the walk has begun again."""
         here = self._stride.here
         return point.arclength > here.arclength and self.walk.closes(here, point)
+
+    @property
+    def _free(self) -> bool:
+        """Whether the orbits meet no condition, as those of a curve do."""
+        return self.walk.start.condition is FREE
 
     @property
     def _stride(self) -> StepperState:
@@ -314,6 +322,12 @@ class LegBuilder:
                 break
             before = self.nodes[self._searched - 1] if self._searched > self._piece else None
             after = next(iter(self.nodes[self._searched + 2 :]), None)
+            if not self._free:
+                found, lost = marks_between(a, b)
+                self.special_points += found
+                self.notes += lost
+                self._searched += 1
+                continue
             try:
                 self.special_points += special_points_between(a, b, before, after)
             except FAILURES as error:
@@ -326,7 +340,7 @@ class LegBuilder:
                 self.special_points += found
                 self.notes += lost
             self._searched += 1
-        if len(self.special_points) > known:
+        if self._free and len(self.special_points) > known:
             self.special_points = without_repeats(self.special_points)
 
     def _along_straight_way(self, a: BranchNode, b: BranchNode) -> list[SpecialPoint] | None:
@@ -347,6 +361,11 @@ class LegBuilder:
         way = [replace(p, arclength=x) for p, x in zip(between, lengths, strict=True)]
         found, lost = _in_pieces([a, *way, b])
         return None if lost else found
+
+
+def _told(node: BranchNode) -> float | Real:
+    """The parameter's value at a point, or the values of several."""
+    return node.value if len(node.family.charts) == 1 else node.values
 
 
 def _grazing_at_end(nodes: Sequence[BranchNode]) -> SpecialPoint:

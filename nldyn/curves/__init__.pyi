@@ -2,4 +2,4 @@
 
 from nldyn.curves.backbone import Backbone as Backbone
 from nldyn.curves.curves import Curve as Curve
-from nldyn.curves.marks import refine_special as refine_special
+from nldyn.curves.refine import refine_special as refine_special

@@ -21,6 +21,7 @@ from nldyn.base.errors import (
     ConvergenceError,
     LocateError,
     SystemModelError,
+    check_positive,
     check_types,
     check_whole,
     is_finite,
@@ -29,10 +30,12 @@ from nldyn.base.optional import optional
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.point import BranchNode, node_of
 from nldyn.bifurcations.roots import root
+from nldyn.branches.branch import Course, WalkEnd
+from nldyn.branches.continuation import alike, make_branch
 from nldyn.branches.endings import Ending, StopReason
+from nldyn.branches.leg import Leg, LegBuilder
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.curves.curves import Curve
-from nldyn.curves.walk import CurveWalk
 from nldyn.flow.flow_map import FlowMap, flow_of
 from nldyn.orbits.bordered import OrbitFamily, correct
 from nldyn.orbits.conditions import Phase
@@ -145,6 +148,53 @@ class Backbone:
         """
         return np.array([_stable(orbit) for orbit in self.orbits])
 
+    def extend(self, largest_m: float, *, max_orbits: int | None = None) -> Backbone:
+        """Follow the family to larger amplitudes, also one that was loaded.
+
+        Its orbits are those of one `backbone` up to there, to the last digit; the one at the end of
+        before is left out. A backbone of a file of an earlier version is followed anew.
+
+        Parameters
+        ----------
+        largest_m : float
+            Largest displacement from rest in m at the observed interface.
+        max_orbits : int, optional
+            Most orbits; as many as before unless given.
+
+        Returns
+        -------
+        Backbone
+
+        Raises
+        ------
+        SystemModelError
+            For an amplitude that is no larger than that of the last orbit.
+
+        Examples
+        --------
+        >>> from nldyn import PolynomialSpring, System
+        >>> duffing = System.from_matrices([[1.0]], [[1.0]], {"x": [1.0]},
+        ...     springs=[PolynomialSpring("x", [0.0, 0.0, 1.0])])
+        >>> longer = backbone(duffing, amplitude_m=(0.01, 0.5)).extend(1.0)
+        >>> whole = backbone(duffing, amplitude_m=(0.01, 1.0))
+        >>> longer.frequency_hz.tolist() == whole.frequency_hz.tolist()
+        True
+        """
+        reached, nodes = float(self.amplitude[-1]), list(self.curve.points)
+        check_positive("largest_m", largest_m)
+        if largest_m <= reached:
+            raise SystemModelError(
+                f"largest_m: the backbone reaches {reached:.6g} m already, got {largest_m:g}"
+            )
+        course = self.curve.branch.course or _course(nodes[0].family, STEPS.max_points)
+        if max_orbits is not None:
+            check_whole("max_orbits", max_orbits, 2)
+            options = replace(course.options, max_points=max_orbits - 1)
+            course = replace(course, options=options)
+        begins = self.curve.stop_reasons[0]
+        leg = Leg(nodes, [], [], self.reason, course.ends[1])
+        return _followed(leg, course, self.mode, largest_m, begins)
+
     def to_pandas(self) -> pandas.DataFrame:
         """Frequency, energy, amplitude, impacts, stability and error of each orbit."""
         return optional("pandas", "to_pandas").DataFrame(
@@ -229,28 +279,41 @@ def backbone(
     low, high = _checked_range(amplitude_m)
     _check_conservative(flow.system)
     start = _begin(flow, name, mode, low)
-    options = replace(STEPS, max_points=max_orbits - 1)
-    walk = CurveWalk(start, options)
-    nodes, reason = _up_to(walk, _rest_m(flow.system, name), high)
+    course = _course(start.family, max_orbits - 1)
     begins = Ending.BEGINS_AT.told(place=f"{low:g} m")
-    parameter = start.family.charts[0].parameter
-    curve = Curve(KIND, (parameter,), tuple(nodes), (), (begins, reason))
-    return Backbone(curve, mode)
+    return _followed(Leg([start], [], [], begins, None), course, mode, high, begins)
 
 
-def _up_to(walk: CurveWalk, rest_m: float, high: float) -> tuple[list[BranchNode], StopReason]:
-    """The points of a walk up to an amplitude from rest, and why it ends."""
-    nodes: list[BranchNode] = []
+def _course(family: OrbitFamily, max_points: int) -> Course:
+    """That of a backbone, at any frequency."""
+    chart, options = family.charts[0], replace(STEPS, max_points=max_points)
+    return Course((chart.low, chart.high), options, alike(family, []))
+
+
+def _followed(leg: Leg, course: Course, mode: int, high: float, begins: StopReason) -> Backbone:
+    """A backbone followed on up to an amplitude from rest."""
+    trail = LegBuilder.going_on(leg, course.limits, course.options, course.open_ends)
+    walk, nodes = trail.walk, list(trail.nodes)
+    stride, kept = walk.stride, len(nodes) - 1
+    rest_m = _rest_m(leg.nodes[0].family.system, leg.nodes[0].orbit.observe)
 
     def off(node: BranchNode) -> float:
         return farthest_from(rest_m, node.orbit) / high - 1.0
 
+    reason = None
     for node in walk:
         if nodes and off(node) > 0.0:
             nodes.append(_where(off, Chord(nodes[-1], node)))
-            return nodes, Ending.AMPLITUDE_RANGE_END.told()
+            reason = Ending.AMPLITUDE_RANGE_END.told()
+            break
         nodes.append(node)
-    return nodes, walk.stop_reason
+        if walk.stride is not None and walk.stride.here is node:
+            stride, kept = walk.stride, len(nodes) - 1
+    assert stride is not None
+    end = WalkEnd(stride.step, stride.behind, stride.count, kept, kept, 0, 0)
+    branch = make_branch("", nodes, [], (begins, reason or walk.stop_reason), [])
+    branch = replace(branch, course=replace(course, ends=(None, end)))
+    return Backbone(Curve(KIND, branch), mode)
 
 
 def _where(off: Callable[[BranchNode], float], chord: Chord) -> BranchNode:
@@ -337,5 +400,3 @@ def _returning(problem: ShootingProblem, begin: Real, omega: float, observe: str
 
 def _rest_m(system: System, observe: str) -> float:
     return float(rest(system) @ system.participation[observe])
-
-

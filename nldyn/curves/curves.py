@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise, zip_longest
+from itertools import zip_longest
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
@@ -23,21 +23,19 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.bifurcations.chord import Chord
+from nldyn.bifurcations.on_curve import passages
 from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special, node_of
 from nldyn.bifurcations.roots import root
 from nldyn.branches.arclength import Stepper
-from nldyn.branches.continuation import start_point
+from nldyn.branches.branch import Branch, Course
+from nldyn.branches.checkpoint import Checkpoint
+from nldyn.branches.continuation import alike, complete, going_on, start_point
 from nldyn.branches.endings import Ending, StopReasons, has_ending
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.branches.tables import orbit_columns
-from nldyn.curves.marks import marks_between
-from nldyn.curves.point import on_charts, passages
-from nldyn.curves.walk import CurveWalk
-from nldyn.flow.flow_map import FlowMap, same_flow
 from nldyn.orbits.bordered import Condition, OrbitFamily, correct, gradient, tangent_surface
 from nldyn.orbits.conditions import Held, Monitor, defined_by
 from nldyn.orbits.orbit import Orbit, check_minimal, same_orbit
-from nldyn.runtime.keeper import Keeper
 from nldyn.runtime.progress import of_place, shows_progress
 from nldyn.system.chart import Chart, checked_parameter, value_of
 from nldyn.system.parameters import Parameter
@@ -80,24 +78,37 @@ class Curve:
     ----------
     kind : str
         What the orbits have in common: LP, PD, NS, BP, GR, or the name of a monitor.
-    parameters : tuple of Parameter
-        What changes.
-    points : tuple of BranchNode
-        In order along the curve.
-    marks : tuple of SpecialPoint
-        Points at which a further condition is met, in the same order.
-    stop_reasons : tuple of StopReason
-        Why the continuation stopped at the first and at the last point.
-    notes : tuple of str
-        What may be missing.
+    branch : Branch
+        The orbits as a branch, whose nodes have the condition that they meet.
     """
 
     kind: str
-    parameters: tuple[Parameter, ...]
-    points: tuple[BranchNode, ...]
-    marks: tuple[SpecialPoint, ...]
-    stop_reasons: StopReasons
-    notes: tuple[str, ...] = ()
+    branch: Branch
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """What changes."""
+        return tuple(chart.parameter for chart in self.branch.nodes[0].family.charts)
+
+    @property
+    def points(self) -> tuple[BranchNode, ...]:
+        """Its points, in order."""
+        return self.branch.nodes
+
+    @property
+    def marks(self) -> tuple[SpecialPoint, ...]:
+        """Points at which a further condition is met, in the same order."""
+        return self.branch.special_points
+
+    @property
+    def stop_reasons(self) -> StopReasons:
+        """Why the continuation stopped at the first and at the last point."""
+        return self.branch.stop_reasons
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What may be missing."""
+        return self.branch.notes
 
     @property
     def orbits(self) -> list[Orbit]:
@@ -165,16 +176,20 @@ class Curve:
         progress: Callable[[Real], None] | None = None,
         checkpoint: CurveFile | None = None,
     ) -> Curve:
-        """Follow the curve beyond its ends, or finish it; the points that it has are kept.
+        """Follow the curve beyond its ends, or finish it.
+
+        Its points are those of one continuation through the new ranges on the scale of the old
+        ones, to the last digit; those at the ends of the old ranges are left out. A curve of a file
+        of an earlier version is followed anew.
 
         Parameters
         ----------
         ranges : one of (float, float) for each parameter
             Values between which to stay, which contain those of the curve.
-        options, progress
-            As for `continue_special`.
-        checkpoint : CheckpointFile, optional
-            As for `continue_special`, but the file may be the one that holds this curve.
+        options : ContinuationOptions, optional
+            Step control from here on; that of before unless given.
+        progress, checkpoint
+            As for `continue_special`; the file may be the one that holds this curve.
 
         Returns
         -------
@@ -185,13 +200,22 @@ class Curve:
         SystemModelError
             For ranges that do not contain the curve, or a file that holds something else.
         """
-        charts = _charts(self.orbits[0], self.parameters, ranges, options, progress)
-        for chart, column in zip(charts, self.values.T, strict=True):
+        wider = _charts(self.orbits[0], self.parameters, ranges, options, progress)
+        for chart, column in zip(wider, self.values.T, strict=True):
             chart.check_start(float(column.min()))
             chart.check_start(float(column.max()))
-        keeper = _keeper(checkpoint, self)
-        whole = replace(self, points=tuple(on_charts(point, charts) for point in self.points))
-        return _followed(whole, options, progress, keeper)
+        old = self.branch.nodes[0].family.charts
+        charts = tuple(
+            chart.over((new.low, new.high)) for chart, new in zip(old, wider, strict=True)
+        )
+        before = self.branch.course or _course(self.points[0].family, start=_start_of(self.branch))
+        course = replace(
+            before, limits=_range(charts[0]), further=tuple(map(_range, charts[1:])),
+            options=options or before.options,
+        )  # fmt: skip
+        whole = replace(self.branch, course=before)
+        with _kept(self.kind, self.points[0], checkpoint) as kept:
+            return Curve(self.kind, going_on(whole, charts, course, progress, kept))
 
     def at(self, parameter: str | Parameter, value: float) -> list[Orbit]:
         """All orbits of the curve at which a parameter has a value, corrected there, each once.
@@ -266,8 +290,9 @@ def continue_special(
     progress : callable, optional
         Called with the parameters' values at every point.
     checkpoint : CheckpointFile, optional
-        A new HDF5 file that keeps the curve, written now and then, at the end, and when an
-        exception such as Ctrl-C ends the computation: `nldyn.load` and `Curve.extend` go on.
+        File that keeps the curve, written now and then, at the end, and when an exception such as
+        Ctrl-C ends the computation. If it holds this very curve, that one goes on and gives the
+        points of an uninterrupted one.
 
     Returns
     -------
@@ -288,8 +313,7 @@ def continue_special(
     """
     check_special("continue_special", special, of_branch=False)
     charts = _charts(special.orbit, parameters, ranges, options, progress)
-    keeper = _keeper(checkpoint)
-    curve = _curve(special.kind, special_start(special, charts), options, progress, keeper)
+    curve = _curve(special.kind, special_start(special, charts), options, progress, checkpoint)
     if len(curve.points) == 1 and has_ending(curve.stop_reasons, Ending.DISSOLVED):
         if checkpoint is not None:
             checkpoint.remove()
@@ -357,11 +381,10 @@ def continue_constant(
         If no orbit with the value is found on the way; the text says which values are.
     """
     charts = _charts(orbit, parameters, ranges, options, progress)
-    keeper = _keeper(checkpoint)
     condition = Held.of(monitor, value, orbit)
     orbit = _with_value(orbit, condition, charts[0], options or ContinuationOptions())
     start = _start(OrbitFamily.around(orbit, charts), orbit, condition)
-    return _curve(condition.name, start, options, progress, keeper)
+    return _curve(condition.name, start, options, progress, checkpoint)
 
 
 def _with_value(orbit: Orbit, condition: Held, chart: Chart, options: ContinuationOptions) -> Orbit:
@@ -448,120 +471,51 @@ def _curve(
     start: BranchNode,
     options: ContinuationOptions | None,
     progress: Callable[[Real], None] | None,
-    keeper: Keeper[Curve],
+    checkpoint: CurveFile | None,
 ) -> Curve:
-    """Walk both ways from the start and mark what is met."""
-    parameters = tuple(chart.parameter for chart in start.family.charts)
-    open_ = Ending.NOT_FINISHED.told()
-    begun = Curve(kind, parameters, (start,), (), (open_, open_))
-    return _followed(begun, options, progress, keeper)
+    """Walk both ways from the start and mark what is met, or go on with what a file holds."""
+    charts = start.family.charts
+    course = _course(start.family, options)
+    with _kept(kind, start, checkpoint) as kept:
+        known = kept.branch_from(start, course)
+        if known is not None:
+            return Curve(kind, going_on(known, charts, course, progress, kept))
+        return Curve(kind, complete("", None, None, start, course, progress, kept))
 
 
-def _keeper(place: CurveFile | None, known: Curve | None = None) -> Keeper[Curve]:
-    """What keeps a curve in a file, which must be new or hold a piece of a known curve."""
+def _course(
+    family: OrbitFamily, options: ContinuationOptions | None = None, start: int = 0
+) -> Course:
+    """That of a curve through the ranges of its charts."""
+    first, *others = map(_range, family.charts)
+    none = alike(family, [])
+    return Course(first, options or ContinuationOptions(), none, start=start, further=tuple(others))
+
+
+def _range(chart: Chart) -> tuple[float, float]:
+    return chart.low, chart.high
+
+
+def _start_of(branch: Branch) -> int:
+    """Where a curve was begun that does not tell how it was followed."""
+    return int(np.argmin([abs(node.arclength) for node in branch.nodes]))
+
+
+def _kept(kind: str, start: BranchNode, place: CurveFile | None) -> Checkpoint:
+    """The checkpoint of one curve of a kind in a file."""
     if place is None:
-        return Keeper()
+        return Checkpoint()
     place.check_writable()
-    if place.exists():
-        if known is None:
-            raise SystemModelError(
-                f"{place.name}: exists already; load and Curve.extend go on from a curve that it "
-                "holds, or choose another file, or delete it"
-            )
-        condition = known.points[0].condition
-        monitor = condition.monitor if isinstance(condition, Held) else None
-        held = place.read_curves(known.orbits[0].system, monitor)
-        if not (len(held) == 1 and _is_piece(held[0], known)):
-            raise KeptWorkError(
-                f"{place.name}: holds another curve, or more of this one; choose another file, or "
-                "delete it"
-            )
-    return Keeper(place.write_curves)
+    condition = start.condition
+    monitor = condition.monitor if isinstance(condition, Held) else None
+    held = place.read_curves(start.orbit.system, monitor) if place.exists() else []
+    if any(curve.kind != kind for curve in held):
+        raise KeptWorkError(f"{place.name}: holds another curve; choose another file, or delete it")
 
+    def write(branches: Sequence[Branch]) -> None:
+        place.write_curves([Curve(kind, branch) for branch in branches])
 
-def _is_piece(held: Curve, known: Curve) -> bool:
-    """Whether a curve has no points but those of another one."""
-    if (held.kind, held.parameters) != (known.kind, known.parameters):
-        return False
-    a, b = held.points[0].family, known.points[0].family
-    rows = {tuple(row) for row in known.values.tolist()}
-    return (
-        (a.period, a.segments) == (b.period, b.segments)
-        and same_flow(FlowMap(a.system, a.options), FlowMap(b.system, b.options))
-        and all(tuple(row) in rows for row in held.values.tolist())
-    )
-
-
-def _followed(
-    curve: Curve,
-    options: ContinuationOptions | None,
-    progress: Callable[[Real], None] | None,
-    keeper: Keeper[Curve],
-) -> Curve:
-    """A curve followed beyond its ends, forward first, with what is met on the new points.
-
-    Of one that was not finished all points are searched.
-    """
-    forward: list[BranchNode] = []
-    backward: list[BranchNode] = []
-    first, last = curve.stop_reasons
-    chosen = options or ContinuationOptions()
-
-    def is_closed() -> bool:
-        return has_ending((first, last), Ending.CLOSED_CURVE)
-
-    def whole() -> Curve:
-        """What there is, not finished before it is searched."""
-        points = [point.reversed() for point in backward[:0:-1]]
-        points += [*curve.points, *forward[1:]]
-        open_, closed = Ending.NOT_FINISHED.told(), Ending.CLOSED_CURVE.told()
-        reasons = open_, closed if is_closed() else open_
-        return replace(curve, points=tuple(points), stop_reasons=reasons)
-
-    with keeper:
-        keeper.work = whole
-        for leg in (forward, backward):
-            if is_closed():
-                break
-            points = whole().points
-            end, origin = points[-1], points[0]
-            if leg is backward:
-                end, origin = origin.reversed(), end.reversed()
-            walk = CurveWalk(end, chosen, origin)
-            for point in walk:
-                leg.append(point)
-                if progress is not None:
-                    progress(point.values)
-                keeper.offer()
-            if leg is forward:
-                last = walk.stop_reason
-            else:
-                first = walk.stop_reason
-        if is_closed():
-            first = last = Ending.CLOSED_CURVE.told()
-        points = whole().points
-        if has_ending(curve.stop_reasons, Ending.NOT_FINISHED):
-            marks, notes = _marked(points)
-        else:
-            (ahead, notes), (before, lost) = _marked(forward), _marked(backward)
-            marks = [*before[::-1], *curve.marks, *ahead]
-            notes = [*curve.notes, *notes, *lost]
-        done = replace(
-            curve, points=points, marks=tuple(marks), stop_reasons=(first, last), notes=tuple(notes)
-        )
-        keeper.work = lambda: done
-    return done
-
-
-def _marked(points: Sequence[BranchNode]) -> tuple[list[SpecialPoint], list[str]]:
-    """What is met between the points, in order, and what may be missing."""
-    marks: list[SpecialPoint] = []
-    notes: list[str] = []
-    for a, b in pairwise(points):
-        more, lost = marks_between(a, b)
-        marks += more
-        notes += lost
-    return marks, notes
+    return Checkpoint(write, earlier=[curve.branch for curve in held], strict=place.name)
 
 
 def _same_place(a: BranchNode, b: BranchNode) -> bool:

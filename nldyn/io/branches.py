@@ -200,7 +200,7 @@ def _write_branch(group: Any, branch: Branch, flows: list[FlowMap]) -> None:
     for name, column in orbit_columns(branch.points).items():
         put(table, name, column, UNITS[name])
     if branch.course is not None:
-        _write_course(group.create_group("course"), branch.course)
+        write_course(group.create_group("course"), branch.course)
 
 
 def _number_of(flow: FlowMap, flows: list[FlowMap]) -> int:
@@ -284,8 +284,11 @@ def _record_columns(flow: FlowMap) -> list[tuple[str, NDArray[Any]]]:
     return [(name, getattr(empty, name)) for name in Record._fields if name != "used"]
 
 
-def _write_course(group: Any, course: Course) -> None:
+def write_course(group: Any, course: Course) -> None:
+    """Write how a branch or curve was continued."""
     set_attribute(group, "limits", course.limits)
+    if course.further:
+        put(group, "further", course.further, "of the further parameters")
     set_attribute(group, "start", course.start)
     set_attribute(group, "special_points_before", course.special_points_before)
     set_attribute(group, "notes_before", course.notes_before)
@@ -361,7 +364,7 @@ def _read_branch(group: Group, flows: Sequence[FlowMap]) -> Branch:
         (StopReason(reasons[0]), StopReason(reasons[1])),
         tuple(group.texts("notes")),
         tuple(_read_points(group.group("requested"), family)),
-        _read_course(group.group("course"), nodes) if "course" in group else None,
+        read_course(group.group("course"), nodes) if "course" in group else None,
     )
 
 
@@ -431,8 +434,10 @@ def _read_motions(group: Group, count: int, flow: FlowMap) -> list[Trajectory | 
     return motions
 
 
-def _read_course(group: Group, nodes: Sequence[BranchNode]) -> Course:
+def read_course(group: Group, nodes: Sequence[BranchNode]) -> Course:
+    """How a branch or curve was continued."""
     low, high = _limits(group)
+    further = group.array("further", -1, 2).tolist() if "further" in group else []
     start = group.whole("start")
     if not 0 <= start < len(nodes):
         raise group.fault("attribute", "start", f"is {start}, but there are {len(nodes)} points")
@@ -450,6 +455,7 @@ def _read_course(group: Group, nodes: Sequence[BranchNode]) -> Course:
         group.whole("notes_before"),
         (backward, forward),
         tuple(map(event_of, group.texts("events"))) if group.has_attribute("events") else (),
+        tuple((a, b) for a, b in further),
     )
 
 

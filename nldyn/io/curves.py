@@ -2,14 +2,15 @@
 
 A file has the attributes ``format``, ``format_version`` and ``software``, and a group for each
 curve: its flow map at the start, its parameters with their ranges, the unknowns, tangents and
-conditions of its points, its marks, and a ``table`` of what is reported of the points, which other
-software may read and this one does not. Datasets carry their unit as the attribute ``unit``.
+conditions of its points and, in ``marked``, of its marks, its ``course`` as that of a branch, and a
+``table`` of what is reported of the points, which other software may read and this one does not.
+Datasets carry their unit as the attribute ``unit``.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from nldyn.branches.tables import UNITS
 from nldyn.curves.backbone import Backbone
 from nldyn.curves.curves import Curve
 from nldyn.flow.flow_map import FlowMap
+from nldyn.io.branches import read_course, write_course
 from nldyn.io.flow import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
 from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute
 from nldyn.orbits.bordered import FREE, Condition, Evaluation, OrbitFamily
@@ -45,7 +47,7 @@ from nldyn.system.chart import UNITS as PARAMETER_UNITS
 from nldyn.system.parameters import Parameter
 
 FORMAT = "nldyn curves"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 POINT_UNIT = f"{STATE_UNIT}; then the parameters' coordinates"
 HELD = 1e-6  # how far the held quantity of a loaded curve may be off
 
@@ -132,17 +134,31 @@ def _write_curve(group: Any, curve: Curve) -> None:
         "frequency_hz": family.frequency_hz,
         "stop_reasons": curve.stop_reasons,
         "notes": curve.notes,
-        "corners": [point.corner for point in points],
         "marks": [mark.kind for mark in marks],
-        "in_log_omega": True,
     }.items():
         set_attribute(group, key, value)
     write_flow(group.create_group("flow_map"), FlowMap(family.system, family.options))
-    charts = [(c.parameter.index, c.low, c.high) for c in family.charts]
-    put(group, "ranges", np.array(charts, dtype=float), "index, then those of the parameters")
+    charts = [(c.parameter.index, c.low, c.high, c.unit) for c in family.charts]
+    put(group, "ranges", np.array(charts, dtype=float), "index, range and scale of the parameters")
     for name in ("unfolding", "origin"):
         if getattr(family, name) is not None:
             put(group, name, getattr(family, name), STATE_UNIT)
+    _write_points(group, points)
+    if marks:
+        _write_points(group.create_group("marked"), [mark.point for mark in marks])
+    put(group, "mark_residual", [mark.residual for mark in marks], "1")
+    put(group, "mark_error", [mark.error for mark in marks], "1")
+    if curve.branch.course is not None:
+        write_course(group.create_group("course"), curve.branch.course)
+    table = group.create_group("table")
+    units = {"residual": "1", **PARAMETER_UNITS, **UNITS}
+    for name, column in curve.table().items():
+        put(table, name, column, units.get(name) or units[name.rsplit("_", 1)[0]])
+
+
+def _write_points(group: Any, points: Sequence[BranchNode]) -> None:
+    set_attribute(group, "corners", [point.corner for point in points])
+    set_attribute(group, "in_log_omega", True)
     put(group, "point", [point.point for point in points], POINT_UNIT)
     put(group, "tangent", [point.tangent for point in points], "as point")
     put(group, "arclength", [point.arclength for point in points], "1")
@@ -153,14 +169,6 @@ def _write_curve(group: Any, curve: Curve) -> None:
     rows = [_numbers_of(point.condition) for point in points]
     for name in rows[0]:
         put(condition, name, np.array([row[name] for row in rows], dtype=float), "relative or SI")
-    places = [family.unknowns(mark.orbit) for mark in marks]
-    put(group, "mark_point", np.reshape(places, (len(marks), points[0].point.size)), POINT_UNIT)
-    put(group, "mark_residual", [mark.residual for mark in marks], "1")
-    put(group, "mark_error", [mark.error for mark in marks], "1")
-    table = group.create_group("table")
-    units = {"residual": "1", **PARAMETER_UNITS, **UNITS}
-    for name, column in curve.table().items():
-        put(table, name, column, units.get(name) or units[name.rsplit("_", 1)[0]])
 
 
 def _numbers_of(condition: Condition) -> dict[str, Any]:
@@ -178,33 +186,45 @@ def _numbers_of(condition: Condition) -> dict[str, Any]:
 def _read_curve(
     group: Group, laws: Laws, monitor: OwnMonitor | None
 ) -> Curve | Branch | Backbone:
-    family = _read_family(group, laws)
-    size = family.n_states + family.n_free
-    corners, reasons = group.texts("corners"), group.texts("stop_reasons")
+    family, kind = _read_family(group, laws), group.text("kind")
+    reasons = group.texts("stop_reasons")
+    nodes = _read_points(group, family, kind, monitor)
+    if len(reasons) != 2 or not nodes:
+        raise group.fault("attribute", "stop_reasons", "must have two entries, of some points")
+    marks = _read_marks(group, family, nodes, kind, monitor)
+    course = read_course(group.group("course"), nodes) if "course" in group else None
+    branch = replace(
+        make_branch(
+            "", nodes, marks, (StopReason(reasons[0]), StopReason(reasons[1])), group.texts("notes")
+        ),
+        course=course,
+    )
+    curve = Curve(kind, branch)
+    if group.has_attribute("mode"):
+        return Backbone(curve, group.whole("mode"))
+    return _as_branch(curve) if nodes[0].condition is FREE else curve
+
+
+def _read_points(
+    group: Group, family: OrbitFamily, kind: str, monitor: OwnMonitor | None
+) -> list[BranchNode]:
+    """Points of a curve, or its marks, each in memory of its own; see `nldyn.io.branches`."""
+    corners = group.texts("corners")
     count = len(corners)
-    points, tangents = _unknowns(group, "point", family, count), group.array("tangent", count, size)
+    points = _unknowns(group, "point", family, count)
+    tangents = group.array("tangent", *points.shape)
     lengths, steps = group.array("arclength", count), group.array("step", count)
-    conditions = _read_conditions(group, family, count, points, monitor)
+    conditions = _read_conditions(group, family, count, points, kind, monitor)
     numbers = zip(
         points, conditions, tangents, steps.tolist(), lengths.tolist(), corners, strict=True
     )
-    nodes = [
-        replace(_node(family, place, condition, step, length), tangent=tangent, corner=corner)
+    return [
+        replace(
+            _node(family, place.copy(), condition, step, length),
+            tangent=tangent.copy(), corner=corner,
+        )
         for place, condition, tangent, step, length, corner in numbers
-    ]
-    if len(reasons) != 2 or not count:
-        raise group.fault("attribute", "stop_reasons", "must have two entries, of some points")
-    curve = Curve(
-        group.text("kind"),
-        tuple(chart.parameter for chart in family.charts),
-        tuple(nodes),
-        tuple(_read_marks(group, family, nodes)),
-        (StopReason(reasons[0]), StopReason(reasons[1])),
-        tuple(group.texts("notes")),
-    )
-    if group.has_attribute("mode"):
-        return Backbone(curve, group.whole("mode"))
-    return _as_branch(curve) if conditions[0] is FREE else curve
+    ]  # fmt: skip
 
 
 def _unknowns(group: Group, name: str, family: OrbitFamily, count: int) -> Real:
@@ -220,13 +240,14 @@ def _unknowns(group: Group, name: str, family: OrbitFamily, count: int) -> Real:
 def _read_family(group: Group, laws: Laws) -> OrbitFamily:
     flow = read_flow(group.group("flow_map"), laws)
     names = group.texts("parameters")
-    ranges = group.array("ranges", len(names), 3)
-    charts = tuple(
-        Chart.of(checked_parameter(flow.system, Parameter(name, int(index))), (low, high))
-        for name, (index, low, high) in zip(names, ranges.tolist(), strict=True)
-    )
+    charts = []
+    for name, numbers in zip(names, group.array("ranges", len(names), -1).tolist(), strict=True):
+        index, low, high, *unit = numbers  # files of earlier versions have no unit
+        chosen = checked_parameter(flow.system, Parameter(name, int(index)))
+        charts.append(replace(Chart.of(chosen, (low, high)), unit=unit[0] if unit else 0.0))
     problem = ShootingProblem(flow, group.whole("period"), group.whole("segments"))
-    family = OrbitFamily(problem, group.text("observe"), group.number("frequency_hz"), charts)
+    held = group.number("frequency_hz")
+    family = OrbitFamily(problem, group.text("observe"), held, tuple(charts))
     if "unfolding" in group:
         family = family.unfolded(group.array("unfolding", family.n_states))
     if "origin" in group:
@@ -235,17 +256,25 @@ def _read_family(group: Group, laws: Laws) -> OrbitFamily:
 
 
 def _read_marks(
-    group: Group, family: OrbitFamily, nodes: Sequence[BranchNode]
-) -> Iterator[SpecialPoint]:
-    """The marks, each with the orbit by the condition of the point of the curve nearest to it."""
+    group: Group,
+    family: OrbitFamily,
+    nodes: Sequence[BranchNode],
+    kind: str,
+    monitor: OwnMonitor | None,
+) -> list[SpecialPoint]:
+    """The marks; of earlier versions each with the condition of the point nearest to it."""
     kinds = group.texts("marks")
-    places = _unknowns(group, "mark_point", family, len(kinds))
     errors = group.array("mark_error", len(kinds)).tolist()
-    points = np.array([node.point for node in nodes])
-    for kind, place, error in zip(kinds, places, errors, strict=True):
-        nearest = nodes[int(np.argmin(np.abs(points - place).max(axis=1)))]
-        node = _node(family, place, nearest.condition, error, nearest.arclength)
-        yield SpecialPoint(kind, node, error)
+    found: list[BranchNode] = []
+    if "marked" in group:
+        found = _read_points(group.group("marked"), family, kind, monitor)
+    elif kinds:
+        points = np.array([node.point for node in nodes])
+        places = _unknowns(group, "mark_point", family, len(kinds))
+        for place, error in zip(places, errors, strict=True):
+            nearest = nodes[int(np.argmin(np.abs(points - place).max(axis=1)))]
+            found.append(_node(family, place, nearest.condition, error, nearest.arclength))
+    return list(map(SpecialPoint, kinds, found, errors))
 
 
 def _node(
@@ -261,10 +290,15 @@ def _node(
 
 
 def _read_conditions(
-    curve: Group, family: OrbitFamily, count: int, points: Real, monitor: OwnMonitor | None
+    curve: Group,
+    family: OrbitFamily,
+    count: int,
+    points: Real,
+    of: str,
+    monitor: OwnMonitor | None,
 ) -> list[Condition]:
     group, n = curve.group("condition"), family.n_states
-    kind, of = group.text("kind"), curve.text("kind")
+    kind = group.text("kind")
     if kind == "Free":
         return [FREE] * count
     if kind == "Phase":

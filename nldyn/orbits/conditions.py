@@ -35,7 +35,7 @@ from nldyn.system.system import System
 KINDS = ("LP", "PD", "NS", "BP", "GR")
 
 BESIDE = 3e-3  # of an orbit's size: a crossing within it belongs to a turn
-BESIDE_BY_DIFFERENCES = 0.1  # the same where no slighter impact is followed, see `CurveWalk`
+BESIDE_BY_DIFFERENCES = 0.1  # the same where no slighter impact is followed, see `Stepper`
 TOUCH = 1e-6  # of an orbit's size: depth of a touch beside its grazing point
 LEVEL, ALIKE = 1e-4, 1e-9  # relative difference of two extremes about to change places, or one
 SAME_EXTREME = 1e-2  # rad between an extreme and itself on a neighbouring orbit
@@ -46,6 +46,7 @@ WIDEST_PASSAGE = 0.5  # rad on either side of a grazing, in which a rigid stop i
 SMALLEST_OVERLAP = 1e-3  # of null vectors: it vanishes where a multiplier is double
 FARTHEST = 0.01  # of the orbit's size: depth of an extreme that may be said to graze
 FOLLOWED_EXTREME = 0.2  # rad between two extremes that are one on neighbouring orbits
+UNFOLDED = 1e-6  # unfolding number from which a branch point has dissolved
 AT_NODE = 1e-12  # rad from a node of shooting, at which an extreme has the state of that
 
 Monitor = str | Callable[[Orbit], float]

@@ -64,11 +64,11 @@ class ShootingProblem:
 
     def nodes(self, point: Real) -> Real:
         """States (k, 2n) of a point."""
-        return point[:-1].reshape(self.segments, self.size)
+        return point[: self.segments * self.size].reshape(self.segments, self.size)
 
     def scale(self, point: Real) -> float:
         """Root mean square of the modal displacements, the unit of relative steps."""
-        states = point[:-1]
+        states = point[: self.segments * self.size]
         return math.sqrt(float(states @ states) / self.segments) or 1.0
 
     def metric(self, point: Real) -> Real:
@@ -166,11 +166,11 @@ def asymmetry(problem: ShootingProblem, point: Real) -> float:
 
 
 def shifts(problem: ShootingProblem, point: Real) -> list[Real]:
-    """Shooting unknowns (N + 1,) of an orbit shifted by each of its excitation periods."""
-    size, every = point.size - 1, problem.segments // problem.period * problem.size
-    twice = np.concatenate([point[:-1], point[:-1]])
+    """Unknowns (N + m,) of an orbit shifted by each of its excitation periods."""
+    size, every = problem.segments * problem.size, problem.segments // problem.period * problem.size
+    twice = np.concatenate([point[:size], point[:size]])
     moves = range(size - every, 0, -every)
-    return [point, *(np.append(twice[move : move + size], point[-1]) for move in moves)]
+    return [point, *(np.append(twice[move : move + size], point[size:]) for move in moves)]
 
 
 def shooting_problem(flow: FlowMap, period: int, segments: int | None = None) -> ShootingProblem:

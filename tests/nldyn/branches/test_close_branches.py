@@ -34,8 +34,9 @@ from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches import arclength as walk
-from nldyn.branches.arclength import BY_TOLERANCE
+from nldyn.branches import guards
 from nldyn.branches.continuation import _without_repeat, start_point
+from nldyn.branches.guards import BY_TOLERANCE
 from nldyn.branches.leg import Leg
 from nldyn.orbits.shooting import asymmetry, metric_length
 from nldyn.scene.build import build_system
@@ -269,8 +270,9 @@ def test_a_walk_that_comes_back_to_where_it_was_says_so(monkeypatch):
 
     Rounding decides from which step on it jumps.
     """
-    monkeypatch.setattr(walk, "SHORTEST_CROSSING", 1e-4)
-    monkeypatch.setattr(walk, "is_crossing", lambda orbit: True)
+    for module in (walk, guards):
+        monkeypatch.setattr(module, "SHORTEST_CROSSING", 1e-4)
+    monkeypatch.setattr(guards, "is_crossing", lambda orbit: True)
     start = solve_orbit(between_stops(1e-9), 11.0)
     branches = (
         continue_branch(start, (11.0, 11.8), options=ContinuationOptions(first_step=step))

@@ -68,6 +68,23 @@ def test_a_backbone_is_saved(tmp_path):
     assert again.amplitude == pytest.approx(found.amplitude, rel=1e-12)
 
 
+@pytest.mark.parametrize("few", [None, 12])
+def test_a_saved_backbone_goes_on_to_the_last_bit(few, tmp_path):
+    """Beyond its amplitude, and beyond its number of orbits; the gap is closed on the way."""
+    system = oscillator(stops=[Stop.linear("x", 3.0, gap=0.5)])
+    whole = backbone(system, amplitude_m=(0.05, 2.0))
+    first = {"amplitude_m": (0.05, 1.0)} if few is None else {"amplitude_m": (0.05, 2.0)}
+    save(backbone(system, **first, max_orbits=few or 500), tmp_path / "backbone.h5")
+    (short,) = load(tmp_path / "backbone.h5")
+    longer = short.extend(2.0, max_orbits=500)
+    assert len(longer.orbits) > len(short.orbits) + 2
+    assert longer.curve.stop_reasons == whole.curve.stop_reasons
+    for a, b in zip(longer.curve.points, whole.curve.points, strict=True):
+        assert np.array_equal(a.point, b.point) and np.array_equal(a.tangent, b.tangent)
+    with pytest.raises(SystemModelError, match="reaches 2 m already"):
+        longer.extend(1.5)
+
+
 def test_a_bilinear_oscillator_has_one_frequency():
     found = backbone(oscillator(stops=[Stop.linear("x", 3.0)]), amplitude_m=(1e-4, 1.0))
     assert found.frequency_hz == pytest.approx(2.0 / (1.0 + 0.5) / (2.0 * np.pi), rel=1e-9)

@@ -28,17 +28,18 @@ from nldyn import (
     continue_special,
     normal_form,
     solve_orbit,
+    switch_branch,
 )
 from nldyn.base.resources import example
+from nldyn.bifurcations import codimension_two as codimension
+from nldyn.bifurcations.codimension_two import along_tori, flip_coefficient, is_torus
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.branches.endings import Ending
 from nldyn.branches.leg import trace
-from nldyn.curves import codimension_two as codimension
 from nldyn.curves import refine_special
-from nldyn.curves.codimension_two import along_tori, flip_coefficient, is_torus
 from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.conditions import Singular, bialternate, max_abs_displacement, peak_force
-from nldyn.orbits.orbit import Orbit
+from nldyn.orbits.orbit import Orbit, minimal_period
 from nldyn.orbits.shooting import shooting_problem
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene
@@ -112,6 +113,22 @@ def test_every_special_point_of_the_branch_solves_its_defining_system(harmonic_b
         refined = refine_special(special)
         assert refined.residual < 1e-11
         assert refined.frequency_hz == pytest.approx(special.frequency_hz, rel=2e-10)
+
+
+def test_branches_leave_a_point_that_knows_no_direction(harmonic_branch, symmetric_branch):
+    """Those of the branch on which it was found, and at a branch point also along that."""
+    special = flip(harmonic_branch)
+    (one,), (other,) = switch_branch(refine_special(special)), switch_branch(special)
+    assert one.orbit.period == 2
+    assert one.orbit.frequency_hz == pytest.approx(other.orbit.frequency_hz, rel=1e-9)
+    special = of_kind(symmetric_branch, "BP")[0]
+    all_ways = [node.orbit for node in switch_branch(refine_special(special))]
+    assert len(all_ways) == 4
+    for node in switch_branch(special):
+        away = [np.abs(orbit.point - node.orbit.point).max() for orbit in all_ways]
+        assert min(away) < 1e-6 * np.abs(node.orbit.point).max()
+    with pytest.raises(SystemModelError, match="no other branch leaves the LP point"):
+        switch_branch(refine_special(fold(harmonic_branch)))
 
 
 @pytest.mark.parametrize(("kind", "low", "target"), [("LP", 12.2, 1.0), ("PD", 15.0, -1.0)])
@@ -473,6 +490,9 @@ def test_curves_of_flips_and_of_grazing_meet_where_both_say(harmonic_branch):
     for special in pair:
         curve = continue_special(special, ("frequency_hz", "gap"), window)
         places.append([m.values for m in curve.marks if m.kind == "GRPD"])
+        (doubled,) = switch_branch(next(m for m in curve.marks if m.kind == "GRPD"))
+        assert minimal_period(doubled.orbit) == 2
+        assert doubled.orbit.frequency_hz == pytest.approx(places[-1][0][0], rel=1e-3)
     (first,), (second,) = places
     assert first == pytest.approx(second, rel=1e-7)
 

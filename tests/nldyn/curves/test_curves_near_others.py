@@ -17,8 +17,8 @@ from nldyn import (
     continue_special,
     solve_orbit,
 )
-from nldyn.curves import marks
-from nldyn.curves.corners import extremes_meet
+from nldyn.bifurcations import marks
+from nldyn.bifurcations.corners import extremes_meet
 
 SECOND = Parameter("natural_frequency_hz", 1)
 
@@ -128,9 +128,9 @@ def test_a_curve_of_grazings_tells_where_its_extreme_vanishes():
 
 def test_a_change_of_sign_at_a_jump_is_a_note_and_no_mark(harmonic, monkeypatch):
     fold = next(p for p in harmonic.special_points if p.kind == "LP")
-    options = ContinuationOptions(max_points=3)
+    options, gap = ContinuationOptions(max_points=3), fold.orbit.system.stops[0].gap * (1.0 + 1e-6)
     monkeypatch.setattr(
-        marks, "curve_tests", lambda point: {"R1": -1.0 if point.arclength < 0 else 1.0}
+        marks, "curve_tests", lambda point: {"R1": -1.0 if point.values[1] < gap else 1.0}
     )
     window = ((4.0, 45.0), (1e-4, 2e-3))
     curve = continue_special(fold, ("frequency_hz", "gap"), window, options=options)

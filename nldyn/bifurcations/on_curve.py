@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES
+from nldyn.bifurcations.codimension_two import codimension_tests
 from nldyn.bifurcations.point import BranchNode, node_of
-from nldyn.curves.codimension_two import codimension_tests
 from nldyn.orbits.bordered import Corrected, correct
 from nldyn.orbits.impact_phases import nodes_to_impacts, start_far_from_impacts
 from nldyn.orbits.shooting import metric_length
-from nldyn.system.chart import Chart
 
 AT_POINT = 1e-6  # share of a step within which two points are one
-NEAR_NODE = 0.3  # rad from an impact to a phase of shooting that it may pass in the next step
+FARTHEST_NODE = 0.3  # rad from an impact to a phase of shooting that it may pass in the next step
 MOST_BENT = 3.0  # times that neighbours may lie apart farther than their arclength says
 
 
@@ -28,19 +26,6 @@ def curve_tests(node: BranchNode) -> dict[str, float]:
     if not node.tests:
         node.tests.update(codimension_tests(node.condition, node.at))
     return node.tests
-
-
-def on_charts(node: BranchNode, charts: tuple[Chart, ...]) -> BranchNode:
-    """The same point with its parameters on the scales of other ranges."""
-    n, point, tangent = node.family.n_states, node.point.copy(), node.tangent.copy()
-    for place, (old, new) in enumerate(zip(node.family.charts, charts, strict=True), n):
-        value = old.value(float(point[place]))
-        tangent[place] *= old.slope(float(point[place]))
-        point[place] = new.coordinate(value)
-        tangent[place] /= new.slope(float(point[place]))
-    family = replace(node.family, charts=charts)
-    tangent /= metric_length(family.metric(point), tangent)
-    return replace(node, family=family, point=point, tangent=tangent)
 
 
 def shot_from(node: BranchNode, start: float) -> BranchNode:
@@ -69,21 +54,24 @@ def on_chart_plane(a: BranchNode, b: BranchNode, which: int, value: float) -> Br
 
 
 def _on_chart_plane(a: BranchNode, b: BranchNode, which: int, value: float) -> BranchNode | None:
-    family = a.family
-    place = family.n_states + which
-    if a.point[place] == b.point[place]:
+    place, target = a.family.n_states + which, a.family.charts[which].coordinate(value)
+    if a.point[place] == target or a.point[place] == b.point[place]:
         return None
-    target = family.charts[which].coordinate(value)
-    share = (target - float(a.point[place])) / float(b.point[place] - a.point[place])
-    way = between(a, b, share) - a.point
-    return on_plane(a, way, share * (b.arclength - a.arclength), which, target)
+    share = (target - a.point[place]) / (b.point[place] - a.point[place])
+    length = a.arclength + share * (b.arclength - a.arclength)
+    for guess in ((1.0 - share) * a.point + share * b.point, between(a, b, share)):
+        found = _held(a, guess, a.tangent, length, which, target)
+        if found is not None:
+            return found
+    return None
 
 
 def clear_of_nodes(a: BranchNode, b: BranchNode) -> tuple[BranchNode, BranchNode]:
     """Two neighbours, by their states at other phases where an impact passes one between them."""
     family = a.family
     apart = metric_length(family.metric(a.point), b.point - a.point)
-    if apart < MOST_BENT * abs(b.arclength - a.arclength) or nodes_to_impacts(a.orbit) > NEAR_NODE:
+    smooth = apart < MOST_BENT * abs(b.arclength - a.arclength)
+    if smooth or nodes_to_impacts(a.orbit) > FARTHEST_NODE:
         return a, b
     start = start_far_from_impacts(a.orbit)
     return shot_from(a, start), shot_from(b, start)
@@ -133,13 +121,20 @@ def on_plane(
     a: BranchNode, way: Real, length: float, which: int, coordinate: float
 ) -> BranchNode | None:
     """Point of the curve near the end of a way from a, where a parameter has a coordinate."""
-    guess = a.point + way
+    return _held(a, a.point + way, way, a.arclength + length, which, coordinate)
+
+
+def _held(
+    a: BranchNode, guess: Real, towards: Real, arclength: float, which: int, coordinate: float
+) -> BranchNode | None:
+    """Point of the curve near a guess, where a parameter has a coordinate."""
     row = np.zeros(guess.size)
     row[a.family.n_states + which] = 1.0
-    found = correct(a.family, guess, a.condition, row, coordinate)
+    guess[a.family.n_states + which] = coordinate
+    found = correct(a.family, guess, a.condition, row, coordinate, like=a.orbit.motion)
     if not found.converged:
         return None
     try:
-        return node_of(found, way, a.arclength + length)
+        return node_of(found, towards, arclength)
     except FAILURES:
         return None

@@ -10,7 +10,6 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES, SystemModelError
 from nldyn.bifurcations.point import BranchNode, node_of
-from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.bordered import (
     SHORTEST_DIFFERENCE,
     Condition,
@@ -33,7 +32,7 @@ CORNER_STEP = 1e-3  # a step shorter than this may have met a corner
 STRAIGHT_AHEAD = 0.9  # cosine of the way to a corner and the tangent
 
 
-def corner_ahead(here: BranchNode, options: ContinuationOptions) -> list[BranchNode]:
+def corner_ahead(here: BranchNode, grazing_step: float, max_step: float) -> list[BranchNode]:
     """The grazing point close ahead at which a curve has a corner, with its tangent behind it.
 
     The derivative of the monodromy matrix jumps at a grazing, and with it the direction of a
@@ -56,7 +55,7 @@ def corner_ahead(here: BranchNode, options: ContinuationOptions) -> list[BranchN
         way = found.at.point - here.point
         length = metric_length(weights, way)
         ahead = float(way @ (weights * here.tangent)) > STRAIGHT_AHEAD * length
-        if not (ahead and length < 10.0 * options.grazing_step):
+        if not (ahead and length < 10.0 * grazing_step):
             return []
         before = float(grazing.value(here.at)[0])
         condition = here.condition.renewed(found.at)
@@ -67,7 +66,7 @@ def corner_ahead(here: BranchNode, options: ContinuationOptions) -> list[BranchN
         )  # fmt: skip
         if linear:
             side = -math.copysign(1.0, before)
-            behind = _behind(corner, grazing, side, 2.0 * options.max_step)
+            behind = _behind(corner, grazing, side, 2.0 * max_step)
             if behind is not None:
                 chord = behind.point - corner.point
                 tangent = chord / metric_length(family.metric(corner.point), chord)

@@ -151,6 +151,11 @@ def cosine_near(mu: Complex, cosine: float) -> float:
     return float(found[np.argmin(np.abs(found - cosine))])
 
 
+def is_torus_curve(condition: Condition) -> bool:
+    """Whether a pair of multipliers has the product 1 on a curve: Neimark-Sacker, or neutral."""
+    return isinstance(condition, Singular) and condition.kind == "NS"
+
+
 def is_torus(mu: Complex) -> bool:
     """Whether the multipliers whose product is nearest to 1 are a complex pair."""
     value = mu[torus_pair(mu)[0]]

@@ -1,36 +1,22 @@
-"""Special points solved by their defining systems, and those met along curves."""
+"""Special points met along curves in two parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from nldyn.base.errors import FAILURES, LocateError, check_whole
+from nldyn.base.errors import FAILURES
 from nldyn.bifurcations.chord import Chord
-from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special
+from nldyn.bifurcations.codimension_two import is_torus, is_torus_curve, torus_pair
+from nldyn.bifurcations.on_curve import between, clear_of_nodes, curve_tests
+from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import leaves_circle
 from nldyn.bifurcations.touching import Touch, touching_extremes
-from nldyn.curves.codimension_two import is_torus, torus_pair
-from nldyn.curves.point import between, clear_of_nodes, curve_tests
-from nldyn.curves.walk import UNFOLDED, is_torus_curve
-from nldyn.orbits.bordered import (
-    Condition,
-    Corrected,
-    OrbitFamily,
-    correct,
-    length_unit,
-)
-from nldyn.orbits.conditions import (
-    Both,
-    BranchPointCondition,
-    Grazing,
-    Singular,
-    defined_by,
-)
-from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, value_of
-from nldyn.system.parameters import Parameter
+from nldyn.orbits.bordered import Condition, Corrected, correct, length_unit
+from nldyn.orbits.conditions import UNFOLDED, Both, BranchPointCondition, Grazing, Singular
 
 POLE = 1e-3  # of its values beside it: what a test is not below where it has no root but a pole
 NOISY = 0.1  # the same for a coefficient made of differences, whose rounding is a hundredth of them
@@ -38,58 +24,7 @@ ALIKE = 1e-6  # share of a step within which touches are those of one orbit by s
 TURNS_BACK = 1e-3  # part of a unit tangent along both parameters, at a cusp
 
 
-def refine_special(
-    special: SpecialPoint, parameter: str | Parameter = FREQUENCY, *, max_iterations: int = 12
-) -> SpecialPoint:
-    """Solve the defining system of a special point by Newton's method in one parameter.
-
-    Parameters
-    ----------
-    special : SpecialPoint
-        LP, PD, NS, GR or BP.
-    parameter : str or Parameter
-        Which number is free: see `nldyn.system.chart.checked_parameter`.
-    max_iterations : int
-        Most steps.
-
-    Returns
-    -------
-    SpecialPoint
-        It knows no direction of a branch.
-
-    Raises
-    ------
-    SystemModelError
-        For an unknown kind or parameter.
-    LocateError
-        If Newton's method does not converge.
-
-    References
-    ----------
-    G. Moore (1980), *Numer. Funct. Anal. Optim.* 2, 441-472 (branch points);
-    W. J. F. Govaerts (2000); Yu. A. Kuznetsov (2004), section 10.3.
-    """
-    check_special("refine_special", special, of_branch=False)
-    check_whole("max_iterations", max_iterations, 1, 1000)
-    orbit = special.orbit
-    chosen = checked_parameter(orbit.system, parameter)
-    value = value_of(orbit.system, orbit.frequency_hz, chosen)
-    span = (0.5 * value, 2.0 * value) if value > 0.0 else (value - 1.0, value + 1.0)
-    if chosen.name == "gap" and value <= 0.0:
-        size = orbit.max_abs_displacement
-        span = (value - size, value + size)
-    family = OrbitFamily.around(orbit, (Chart(chosen, *span),))
-    family, condition = defined_by(special.kind, family, orbit)
-    guess = family.unknowns(orbit)
-    found = correct(family, guess, condition, max_iterations=max_iterations)
-    if not found.converged:
-        raise LocateError(
-            f"{special.kind} near {orbit.frequency_hz:.6g} Hz was not refined: {found.failure}"
-        )
-    return SpecialPoint(special.kind, _without_direction(found, 0.0), found.step)
-
-
-def _without_direction(found: Corrected, arclength: float) -> BranchNode:
+def without_direction(found: Corrected, arclength: float) -> BranchNode:
     """A solution of a defining system, of which no branch is followed."""
     none = np.zeros(found.point.size)
     return BranchNode(
@@ -101,6 +36,7 @@ def marks_between(a: BranchNode, b: BranchNode) -> tuple[list[SpecialPoint], lis
     """What is met between two neighbouring points of a curve, in order, and what may be missing."""
     if not (np.any(a.orbit.point[:-1]) and np.any(b.orbit.point[:-1])):
         return [], []  # from rest on, of which the others are multiples
+    start = a.family.start
     a, b = clear_of_nodes(a, b)
     chord, span = Chord(a, b), abs(b.arclength - a.arclength)
     found: list[tuple[float, SpecialPoint]] = []
@@ -126,7 +62,19 @@ def marks_between(a: BranchNode, b: BranchNode) -> tuple[list[SpecialPoint], lis
     if b.corner:
         found.append((1.0, SpecialPoint(b.corner, b, b.orbit.error)))
     found.sort(key=lambda pair: pair[0])
-    return [mark for _, mark in found], notes
+    return [_shot_from(mark, start) for _, mark in found], notes
+
+
+def _shot_from(mark: SpecialPoint, start: float) -> SpecialPoint:
+    """A mark by the states at the phases of shooting of its curve."""
+    node = mark.point
+    if node.family.start == start:
+        return mark
+    family = node.family.shot_from(start)
+    at = family.at(family.unknowns(node.orbit))
+    condition, none = node.condition.renewed(at), np.zeros(at.point.size)
+    point = replace(node, family=family, point=at.point, tangent=none, condition=condition)
+    return replace(mark, point=point)
 
 
 def _touched(touches: Sequence[Touch], chord: Chord) -> tuple[float, SpecialPoint]:
@@ -167,7 +115,7 @@ def _met_at_touch(name: str, chord: Chord, touch: Touch) -> tuple[float, Special
     if isinstance(a.condition, BranchPointCondition) and abs(found.at.point[-1]) > UNFOLDED:
         return None
     length = a.arclength + sigma * (b.arclength - a.arclength)
-    return sigma, SpecialPoint(name, _without_direction(found, length), found.step)
+    return sigma, SpecialPoint(name, without_direction(found, length), found.step)
 
 
 def _share(touch: Touch, a: BranchNode, b: BranchNode) -> float:
