@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import Real, hermite
 from nldyn.base.errors import LocateError, failing_as
 from nldyn.bifurcations.branch_crossing import NEIGHBOUR, SHORTEST_CROSSING
 from nldyn.bifurcations.normal_form_coefficients import correct_across
@@ -134,12 +134,7 @@ class Chord:
         a, b = self.at(below), self.at(above)
         x = (sigma - below) / (above - below)
         start, end = ((above - below) * self._slope(point) for point in (a, b))
-        return np.asarray(
-            (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a.point
-            + x * (1.0 - x) ** 2 * start
-            + x * x * (3.0 - 2.0 * x) * b.point
-            + x * x * (x - 1.0) * end
-        )
+        return hermite(x, a.point, b.point, start, end)
 
     def _nearest(self, sigma: float) -> BranchNode:
         """The known point nearest to a position."""

@@ -141,14 +141,14 @@ def _meeting(
     return None
 
 
-def extremes_meet(here: BranchNode) -> bool:
+def extremes_meet(here: BranchNode, within: float = MEETS) -> bool:
     """Whether the next extreme of the other kind is as near to zero as the one that grazes."""
     grazing = here.condition
     if not isinstance(grazing, Grazing):
         return False
     found, full = here.orbit.touches(grazing.stop), 2.0 * math.pi * here.orbit.period
     other = nearest(found.phases, found.is_maximum, not grazing.is_maximum, grazing.phase, full)
-    return bool(other >= 0 and abs(found.values[other]) < MEETS * grazing.unit)
+    return bool(other >= 0 and abs(found.values[other]) < within * grazing.unit)
 
 
 def grazes_linear(orbit: Orbit) -> bool:

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import Real, hermite
 from nldyn.base.errors import FAILURES
 from nldyn.bifurcations.codimension_two import codimension_tests
 from nldyn.bifurcations.point import BranchNode, node_of
@@ -109,12 +109,7 @@ def passages(points: Iterable[BranchNode], which: int, value: float) -> Iterator
 def between(a: BranchNode, b: BranchNode, x: float) -> Real:
     """Unknowns at a share of the way from a to b, by cubic interpolation with the tangents."""
     span = b.arclength - a.arclength
-    return np.asarray(
-        (1.0 + 2.0 * x) * (1.0 - x) ** 2 * a.point
-        + x * (1.0 - x) ** 2 * span * a.tangent
-        + x * x * (3.0 - 2.0 * x) * b.point
-        + x * x * (x - 1.0) * span * b.tangent
-    )
+    return hermite(x, a.point, b.point, span * a.tangent, span * b.tangent)
 
 
 def on_plane(

@@ -82,6 +82,8 @@ class BranchNode:
     @property
     def values(self) -> Real:
         """Values of the parameters."""
+        if self.family.in_frequency_alone:
+            return np.array([self.orbit.frequency_hz])
         return self.family.values(self.point)
 
     @property

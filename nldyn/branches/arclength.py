@@ -62,6 +62,7 @@ BESIDE_RESONANCE = 1e-6  # relative distance from one, where steps are lost in r
 LOST_IN_ROUNDING = 1e-7  # of an orbit's size, which is far more than Newton's method leaves
 SCALES = 1e-8  # relative departure from a proportional change that is rounding
 BESIDE_STEP = 0.01  # squared distance from a step, over its own, of what it passes through
+ONE_EXTREME = 1e-9  # depth between two extremes, relative to the orbit, that is rounding
 ALONG = 1e-12  # part of a unit tangent that is rounding
 
 
@@ -390,7 +391,7 @@ class Stepper:
     def _leaves_range(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
         """The point exactly at an end of a range; none if the walk stands there."""
         passed = []
-        pairs = zip(_values(here), _values(there), self._ranges, strict=True)
+        pairs = zip(here.values.tolist(), there.values.tolist(), self._ranges, strict=True)
         for which, (a, b, (low, high)) in enumerate(pairs):
             if not low <= b <= high:
                 limit = low if b < low else high
@@ -399,7 +400,7 @@ class Stepper:
             return None
         share, which, limit = min(passed)
         self.stop_reason = self._at_range_end(which)
-        if share <= SLACK:
+        if share <= (0.0 if here.condition is FREE else SLACK):
             return []
         end = on_chart_plane(here, there, which, limit)
         if end is None and not here.family.in_frequency_alone:
@@ -416,7 +417,7 @@ class Stepper:
         family = here.family
         if family.in_frequency_alone:
             return None
-        weights, values = family.metric(here.point), _values(here)
+        weights, values = family.metric(here.point), here.values.tolist()
         for which, (chart, limits) in enumerate(zip(family.charts, self._ranges, strict=True)):
             place = family.n_states + which
             slope = float(here.tangent[place])
@@ -496,9 +497,9 @@ class Stepper:
         self.stop_reason = Ending.RESONANCE.told()
         return [there]
 
-    def _vanishes(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
+    def _vanishes(self, _: BranchNode, there: BranchNode) -> list[BranchNode] | None:
         """A curve of grazings whose extreme meets the next one of the other kind."""
-        if not (extremes_meet(here) and extremes_meet(there)):
+        if not extremes_meet(there, ONE_EXTREME):
             return None
         self.stop_reason = Ending.EXTREME_VANISHES.told()
         return [there]
@@ -582,11 +583,6 @@ class Stepper:
 
 def _at_grazing(point: BranchNode) -> StopReason:
     return Ending.GRAZES_RIGID.told(place=place_of(point, 9))
-
-
-def _values(node: BranchNode) -> list[float]:
-    """Values of the parameters."""
-    return [node.value, *node.values.tolist()[1:]]
 
 
 def scales(point: Real, tangent: Real) -> bool:

@@ -477,11 +477,10 @@ def goes_on(leg: Leg, course: Course) -> bool:
     if end is None:
         return False
     if ending in (Ending.RANGE_END, Ending.PARAMETER_RANGE_END, Ending.NO_ORBIT_AT_RANGE_END):
-        values = [leg.nodes[-1].value, *leg.nodes[-1].values.tolist()[1:]]
-        return all(
-            low + SLACK * max(abs(low), abs(high)) < value < high - SLACK * max(abs(low), abs(high))
-            for value, (low, high) in zip(values, (course.limits, *course.further), strict=True)
-        )
+        ranges = np.array([course.limits, *course.further])
+        slack = SLACK * np.abs(ranges).max(axis=1)
+        values = leg.nodes[-1].values
+        return bool(np.all((ranges[:, 0] + slack < values) & (values < ranges[:, 1] - slack)))
     if ending is Ending.MOST_POINTS:
         return options.max_points > end.count
     if ending is Ending.SHORT_STEP:

@@ -204,16 +204,13 @@ class Curve:
         for chart, column in zip(wider, self.values.T, strict=True):
             chart.check_start(float(column.min()))
             chart.check_start(float(column.max()))
-        old = self.branch.nodes[0].family.charts
-        charts = tuple(
-            chart.over((new.low, new.high)) for chart, new in zip(old, wider, strict=True)
-        )
-        before = self.branch.course or _course(self.points[0].family, start=_start_of(self.branch))
-        course = replace(
-            before, limits=_range(charts[0]), further=tuple(map(_range, charts[1:])),
-            options=options or before.options,
-        )  # fmt: skip
-        whole = replace(self.branch, course=before)
+        pairs = zip(self.points[0].family.charts, wider, strict=True)
+        charts = tuple(old.over(_range(new)) for old, new in pairs)
+        whole = _begun(self.branch)
+        assert whole.course is not None
+        options = options or whole.course.options
+        first, *others = map(_range, charts)
+        course = replace(whole.course, limits=first, further=tuple(others), options=options)
         with _kept(self.kind, self.points[0], checkpoint) as kept:
             return Curve(self.kind, going_on(whole, charts, course, progress, kept))
 
@@ -483,22 +480,24 @@ def _curve(
         return Curve(kind, complete("", None, None, start, course, progress, kept))
 
 
-def _course(
-    family: OrbitFamily, options: ContinuationOptions | None = None, start: int = 0
-) -> Course:
+def _course(family: OrbitFamily, options: ContinuationOptions | None = None) -> Course:
     """That of a curve through the ranges of its charts."""
     first, *others = map(_range, family.charts)
-    none = alike(family, [])
-    return Course(first, options or ContinuationOptions(), none, start=start, further=tuple(others))
+    chosen = options or ContinuationOptions()
+    return Course(first, chosen, alike(family, []), further=tuple(others))
 
 
 def _range(chart: Chart) -> tuple[float, float]:
     return chart.low, chart.high
 
 
-def _start_of(branch: Branch) -> int:
-    """Where a curve was begun that does not tell how it was followed."""
-    return int(np.argmin([abs(node.arclength) for node in branch.nodes]))
+def _begun(branch: Branch) -> Branch:
+    """A curve that goes on; one that does not tell how it was followed, anew from its start."""
+    if branch.course is not None:
+        return branch
+    start = int(np.argmin([abs(node.arclength) for node in branch.nodes]))
+    course = replace(_course(branch.nodes[0].family), start=start)
+    return replace(branch, course=course, stop_reasons=(Ending.NOT_FINISHED.told(),) * 2)
 
 
 def _kept(kind: str, start: BranchNode, place: CurveFile | None) -> Checkpoint:
