@@ -136,18 +136,22 @@ def no_orbit(attempt: Attempt) -> str:
     return found.failure + (f", last relative step {found.step:.1e}" if step else "")
 
 
+def _told(obstacle: str, holds: bool) -> str:
+    return obstacle if holds else ""
+
+
 def jumped(attempt: Attempt) -> str:
     """The orbit is one shifted by some excitation periods, or one of half the period."""
     family, here, there = attempt.here.family, attempt.here.point, attempt.found.point
     jump = is_shifted(family, here, attempt.straight, there)
-    return "the next orbit is a shifted one, or one of half the period" * jump
+    return _told("the next orbit is a shifted one, or one of half the period", jump)
 
 
 def mends(attempt: Attempt) -> str:
     """A broken symmetry is whole again; along a curve rounding may break it."""
     family, here, there = attempt.here.family, attempt.here.point, attempt.found.point
     mended = attempt.free and mends_symmetry(family, here, there)
-    return "the next orbit is a symmetric one" * mended
+    return _told("the next orbit is a symmetric one", mended)
 
 
 def changes_impacts(attempt: Attempt) -> str:
@@ -156,20 +160,20 @@ def changes_impacts(attempt: Attempt) -> str:
         return ""
     orbit = attempt.found.orbit
     changes = loses_impact(orbit) or grazing_between(attempt.here.orbit, orbit)
-    return "an impact with a rigid stop is lost or won" * changes
+    return _told("an impact with a rigid stop is lost or won", changes)
 
 
 def bends_at_rigid_grazing(attempt: Attempt) -> str:
     """The branch with a slight impact and that without meet in a corner."""
     bends = attempt.kinked and attempt.touched
     bends = bends and grazes_rigid(attempt.here.orbit, -GRAZES, GRAZES)
-    return "the branch bends where a rigid stop is grazed" * bends
+    return _told("the branch bends where a rigid stop is grazed", bends)
 
 
 def misses(attempt: Attempt) -> str:
     """The point lies far from where it was predicted."""
     far = attempt.miss > attempt.options.max_miss
-    return "the next point lies far from where it was predicted" * far
+    return _told("the next point lies far from where it was predicted", far)
 
 
 def is_off(attempt: Attempt) -> str:
@@ -179,13 +183,13 @@ def is_off(attempt: Attempt) -> str:
     landed on another branch.
     """
     far = attempt.off > FARTHEST_OFF * attempt.options.max_angle * attempt.step
-    return "the next point lies far from the tangent" * far
+    return _told("the next point lies far from the tangent", far)
 
 
 def turns(attempt: Attempt) -> str:
     """The branch turns far, or has no direction."""
     try:
-        return "the direction changes too much" * (attempt.angle > attempt.options.max_angle)
+        return _told("the direction changes too much", attempt.angle > attempt.options.max_angle)
     except FAILURES as error:
         if attempt.free:
             raise
@@ -198,7 +202,7 @@ def changes_pair(attempt: Attempt) -> str:
         return ""
     before = torus_cosine(attempt.here.orbit.multipliers)
     after = cosine_near(attempt.there.orbit.multipliers, before)
-    return "the pair of multipliers changes too much" * (abs(after - before) > TURN)
+    return _told("the pair of multipliers changes too much", abs(after - before) > TURN)
 
 
 def touches(attempt: Attempt) -> str:
@@ -212,13 +216,15 @@ def touches(attempt: Attempt) -> str:
         return ""
     root = isinstance(here.condition, Singular) and not attempt.looked and grazes_linear(here.orbit)
     far = root or attempt.step > attempt.options.grazing_step
-    return "the number of contacts changes" * far
+    return _told("the number of contacts changes", far)
 
 
 def meets_flip(attempt: Attempt) -> str:
     """A doubled branch meets the one it comes from in a long step."""
     long = attempt.step > max(MEETING_STEP, attempt.crossing)
-    return "orbits of half the period are met" * (long and passed_flip(attempt.here, attempt.found))
+    return _told(
+        "orbits of half the period are met", long and passed_flip(attempt.here, attempt.found)
+    )
 
 
 def crosses_branch(attempt: Attempt) -> str:
@@ -228,14 +234,14 @@ def crosses_branch(attempt: Attempt) -> str:
     if not crosses(attempt.here, attempt.there):
         return ""
     long = attempt.step > max(attempt.crossing, SHORTEST_CROSSING)
-    return "another branch is crossed" * (long or not is_crossing(attempt.found))
+    return _told("another branch is crossed", long or not is_crossing(attempt.found))
 
 
 def ends_on_crossing(attempt: Attempt) -> str:
     """Another branch crosses where the step ends."""
     within = min(NEAR_CROSSING * attempt.step, ON_CROSSING)
     on = attempt.free and lies_on_crossing(attempt.found, within)
-    return "another branch crosses at the next point" * on
+    return _told("another branch crosses at the next point", on)
 
 
 OF_ORBITS: Sequence[Guard] = (no_orbit, mends, jumped, changes_impacts, bends_at_rigid_grazing)
