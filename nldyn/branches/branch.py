@@ -114,6 +114,11 @@ class Course:
     events: tuple[Event, ...] = ()
     further: tuple[tuple[float, float], ...] = ()
 
+    @property
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """Values of all parameters between which to stay."""
+        return self.limits, *self.further
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Branch:

@@ -220,7 +220,7 @@ def _is_begun_at(branch: Branch, place: Place, course: Course) -> bool:
         and start.orbit.observe == place.orbit.observe
         and start.family.scales == place.family.scales
         and start.family.holds(place.orbit)
-        and (mine.limits, mine.further) == (course.limits, course.further)
+        and mine.ranges == course.ranges
         and mine.options == course.options
         and np.array_equal(mine.open_ends, course.open_ends)
         and problem.segments == own.segments

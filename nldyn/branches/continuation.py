@@ -230,7 +230,7 @@ def going_on(
     assert course is not None
     branch = on_charts(branch, charts)
     known = checkpoint.branch_from(branch.nodes[course.start], new, course)
-    if known is not None and known.course is not None and known.course.limits == new.limits:
+    if known is not None and known.course is not None and known.course.ranges == new.ranges:
         branch, course = known, known.course  # this very extension was begun before
     forward, backward = split(branch, course)
     start = branch.nodes[course.start]
@@ -477,7 +477,7 @@ def goes_on(leg: Leg, course: Course) -> bool:
     if end is None:
         return False
     if ending in (Ending.RANGE_END, Ending.PARAMETER_RANGE_END, Ending.NO_ORBIT_AT_RANGE_END):
-        ranges = np.array([course.limits, *course.further])
+        ranges = np.array(course.ranges)
         slack = SLACK * np.abs(ranges).max(axis=1)
         values = leg.nodes[-1].values
         return bool(np.all((ranges[:, 0] + slack < values) & (values < ranges[:, 1] - slack)))

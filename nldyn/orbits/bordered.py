@@ -449,7 +449,10 @@ class Condition(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Free:
-    """No condition."""
+    """No condition; there is one such object, also of another process."""
+
+    def __reduce__(self) -> str:
+        return "FREE"
 
     def value(self, at: Evaluation) -> Real:
         """Nothing to hold, shape (0,)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import pickle
 
 import numpy as np
 import pytest
@@ -33,6 +34,7 @@ from nldyn.branches.continuation import start_point
 from nldyn.branches.leg import trace
 from nldyn.branches.peaks import lowest_orbit, resonance_peaks
 from nldyn.orbits import OrbitSearchOptions
+from nldyn.orbits.bordered import FREE
 from nldyn.orbits.critical_functions import branch_point_test, flip_test, torus_test
 from nldyn.orbits.orbit import Orbit, minimal_period, same_orbit
 from nldyn.scene.build import build_system
@@ -413,6 +415,12 @@ def test_smaller_steps_give_the_same_special_points(one_dof):
     for a, b in zip(coarse.special_points, fine.special_points, strict=True):
         assert a.kind == b.kind
         assert a.frequency_hz == pytest.approx(b.frequency_hz, rel=1e-9)
+
+
+def test_points_from_another_process_are_free_as_before(harmonic_branch):
+    """Walks ask for the one object that stands for no condition."""
+    node = harmonic_branch.nodes[0]
+    assert pickle.loads(pickle.dumps(node)).condition is node.condition is FREE
 
 
 @pytest.mark.parametrize("middle_fails", [True, False])
