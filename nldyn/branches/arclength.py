@@ -244,7 +244,7 @@ class Stepper:
         looked = bool(here.corner)
         nearest = SHORTEST_CROSSING if free else CORNER_STEP
         while step >= self.options.min_step:
-            made = self._advance(behind, here, step, looked=looked)
+            made = self._advance(behind, here, step, 0.0, looked)
             if not free:
                 made = self._clear_of_nodes(made, here, step, looked)
             elif made is None and step <= KINK:
@@ -292,7 +292,7 @@ class Stepper:
         none = np.empty((0, here.tangent.size))
 
         def straight_on(shot: BranchNode, length: float) -> Advance | None:
-            return self._advance(none, shot, length, looked=looked)
+            return self._advance(none, shot, length, 0.0, looked)
 
         return over_node(here, step, straight_on) or made
 
