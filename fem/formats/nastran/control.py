@@ -59,10 +59,15 @@ def divided(lines: Sequence[Line], source: Path) -> tuple[Control, list[Line], l
     Raises
     ------
     ModelError
-        If one case chooses twice.
+        If one case chooses twice, or the line that begins the bulk data is misspelt.
     """
     starts = [i for i, line in enumerate(lines) if BEGIN.match(line.text)]
     control, bulk = Control(), list(lines)
+    for line in lines if not starts else ():
+        if re.match(r"\s*BEGIN", line.text, re.IGNORECASE):
+            raise ModelError(
+                f"{source}: {line.place(source)}: {line.text.strip()}: write it as BEGIN BULK"
+            )
     if starts:
         before = lines[: starts[0]]
         parameters = [line for line in before if PARAM.match(line.text)]

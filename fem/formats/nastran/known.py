@@ -51,7 +51,8 @@ _LEFT_OUT = {
         PBUSHT PELAST PDAMPT MATT11 MATFT""",
     "bodies in contact: give them as [[stops]] in the scene": """
         BSURF BSURFS BCPROP BCPROPS BCTPARM BCTPARA BCTADD BCPARA BCBODY BCONTACT BCTABLE BCSET
-        BCRPARA BFRIC BCRIGID BCRGSRF BCBODY1 BCBDPRP BCGRID BCNURBS BCPATCH BCTABL1 BCPATCH""",
+        BCRPARA BFRIC BCRIGID BCRGSRF BCBODY1 BCBDPRP BCGRID BCNURBS BCPATCH BCTABL1 BCONECT BCONPRG
+        BCONPRP""",
 }
 LEFT_OUT = {card: why for why, cards in _LEFT_OUT.items() for card in cards.split()}
 """Cards that are left out by intention, and why."""
@@ -83,7 +84,7 @@ _REFUSED = {
     "a bush or damper that depends on frequency, speed or direction is not read": """
         CBUSH1D PBUSH1D CBUSH2D PBUSH2D CDAMP5 PDAMP5 CBEAR CGENEL PELAST1""",
     "a property that other cards are needed for; give PSHELL or PCOMP": "PCOMPS PCOMPLS PLCOMP",
-    "an orthotropic material of solids; give it as MAT9": "MAT3 MAT11 MAT12 MATORT MATUDS",
+    "an orthotropic material; give solids a MAT1, shells a MAT8": "MAT3 MAT11 MAT12 MATORT MATUDS",
 }
 ADVICE = {card: advice for advice, cards in _REFUSED.items() for card in cards.split()}
 """What to do instead of some of the cards that are refused."""

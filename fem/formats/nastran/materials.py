@@ -15,9 +15,9 @@ SAME = 1e-3  # relative: moduli that are those of one isotropic material
 EXPANSION = "thermal expansion is not used: stiffness and mass are those of the cold structure"
 CONTRADICTING = 0.01
 """Relative difference between G and E / (2 (1 + NU)) from which Nastran warns."""
-DAMPINGS = {"MAT1": 7, "MAT2": 12, "MAT8": 16, "MAT9": 30}
+DAMPINGS = {"MAT1": 7, "MAT2": 12, "MAT8": 16}
 """Where the coefficient of structural damping (GE) stands."""
-EXPANSIONS = {"MAT1": (5,), "MAT2": (8, 9, 10), "MAT8": (8, 9), "MAT9": tuple(range(23, 29))}
+EXPANSIONS = {"MAT1": (5,), "MAT2": (8, 9, 10), "MAT8": (8, 9)}
 
 
 @dataclass(frozen=True)
@@ -58,14 +58,6 @@ class Plane:
 
     plane_law: FloatArray
     shear_law: FloatArray
-    density: float
-
-
-@dataclass(frozen=True)
-class Spatial:
-    """Stiffness (6, 6) for the strains xx, yy, zz, xy, yz and zx, and the density, of MAT9."""
-
-    law: FloatArray
     density: float
 
 
@@ -156,18 +148,16 @@ class Materials:
         )
         return Plane(law, np.diag(card.reals(5, 2)), self.factor * card.real(7))
 
-    def solid(self, number: int, card: Card) -> Isotropic | Spatial:
-        """The material of a solid: MAT1 or MAT9."""
+    def solid(self, number: int, card: Card) -> Isotropic:
+        """The material of a solid: MAT1."""
         own = self._card(number, card)
-        if own.name == "MAT1":
-            return self._resisting_shear(own)
-        if own.name != "MAT9":
-            raise card.fail(f"needs a MAT1 or MAT9, but material {number} is {own.name}")
-        self._tell_of_unused(own)
-        law = np.zeros((6, 6))
-        law[np.triu_indices(6)] = own.reals(1, 21)
-        law = law + law.T - np.diag(np.diag(law))
-        return Spatial(law, self.factor * own.real(22))
+        if own.name == "MAT9":
+            raise own.fail(
+                "solids of it are not read; give a MAT1, or the part with its material in the scene"
+            )
+        if own.name != "MAT1":
+            raise card.fail(f"needs a MAT1, but material {number} is {own.name} in {own.place}")
+        return self._resisting_shear(own)
 
     def _card(self, number: int, card: Card) -> Card:
         if number not in self.cards:

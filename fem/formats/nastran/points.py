@@ -29,8 +29,9 @@ def read_points(gathered: Gathered, mass_factor: float) -> None:
         for n in range(1, 5):
             for card in gathered.deck.of(f"{sort}{n}"):
                 _read_scalar(gathered, card, n, kind, properties, mass_factor)
+    corners = gathered.joined - gathered.turns
     for card in gathered.deck.of("CBUSH"):
-        _read_bush(gathered, card)
+        _read_bush(gathered, card, corners)
     for card in gathered.deck.of("CVISC"):
         _read_viscous(gathered, card)
     for card in gathered.deck.of("CONM2"):
@@ -107,6 +108,7 @@ def _ends(gathered: Gathered, card: Card, first: int, n: int) -> list[tuple[int,
         if grid in gathered.deck.scalars:
             found.append((grid, 1))
         elif n < 3:
+            gathered.deck.place(grid, card)
             found.append((grid, card.components(component)[0]))
         else:
             raise card.fail(f"{grid} is not a scalar point")
@@ -177,8 +179,11 @@ def _read_full_mass(gathered: Gathered, card: Card, factor: float) -> None:
     gathered.add_matrix(card, rows, mass=matrix)
 
 
-def _read_bush(gathered: Gathered, card: Card) -> None:
-    """CBUSH: six springs and dampers at a place between two grid points, or to the ground."""
+def _read_bush(gathered: Gathered, card: Card, corners: set[int]) -> None:
+    """CBUSH: six springs and dampers at a place between two grid points, or to the ground.
+
+    Of `corners` nothing else has rotations.
+    """
     gathered.add_element(card)
     owners = gathered.deck.by_number("PBUSH")
     number = card.whole(1, card.whole(0))
@@ -195,6 +200,12 @@ def _read_bush(gathered: Gathered, card: Card) -> None:
     for grid, place in zip(ends, places, strict=True):
         if (stiffness[3:].any() or damping[3:].any()) or np.linalg.norm(centre - place) > 0.0:
             gathered.turns.add(grid)
+            if grid in corners:
+                gathered.deck.notes.append(
+                    f"{gathered.deck.source}: {card.place}: CBUSH {card.whole(0)} turns the grid"
+                    f" point {grid}, whose other elements have no rotations: hold these by SPC, or"
+                    " leave out its K4 to K6 and its arm"
+                )
         gathered.joined.add(grid)
     rows, forms = [], []
     for sign, grid, place in zip((1.0, -1.0), ends, places, strict=False):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fem.base.errors import ModelError
 from fem.formats.nastran.cards import Card
 from fem.formats.nastran.gathered import Gathered
-from fem.formats.nastran.materials import Isotropic, Materials
+from fem.formats.nastran.materials import Materials
 from fem.model.parts import Material, SolidPart
 
 KINDS = {
@@ -55,8 +55,6 @@ def _described(
     own = properties[owner]
     try:
         law = materials.solid(own.whole(1), own)
-        if not isinstance(law, Isotropic):
-            raise own.fail("solids of MAT9 are not read; give an isotropic material")
         return {"made": SolidPart(Material(law.youngs_modulus, law.density, law.poissons_ratio))}
     except ModelError as error:
         return {"refused": str(error)}

@@ -109,6 +109,8 @@ BRICK = bulk(fem.box_mesh("body", (1.0, 1.0, 1.0), (1, 1, 1), kind="hexahedron")
         ("PSOLID,2,1", "PSOLID,2,1,,,,,PFLUID", r"PSOLID: is of a fluid .*\(PFLUID\), no solid"),
         ("PSOLID,2,1", "PSOLID,2,1,,,,,,,+A\n+B", r"goes on with the mark '\+B', but PSOLID"),
         ("CHEXA", "$CHEXA", "is no Nastran bulk data with elements|line"),
+        ("BEGIN BULK", "BEGIN_BULK", "line 3: BEGIN_BULK: write it as BEGIN BULK"),
+        ("MAT1,1,2.+11,,.3,8000.", "MAT9,1,1.+11", "line 6: MAT9: solids of it are not read; give"),
         ("BEGIN BULK", "BEGIN SUPER=1", "superelements are not read; write the model as one"),
     ],
 )  # fmt: skip
@@ -117,7 +119,7 @@ def test_what_is_not_read_is_refused_with_its_place(tmp_path, old, new, said):
     assert old in BRICK
     path.write_text(BRICK.replace(old, new, 1))
     with pytest.raises(fem.ModelError, match=said):
-        fem.read_structure(path)
+        fem.parts_of(fem.read_structure(path))
 
 
 def test_cards_of_analyses_and_unused_systems_change_nothing(tmp_path):

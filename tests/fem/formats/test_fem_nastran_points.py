@@ -80,6 +80,7 @@ def test_coordinate_systems_stand_in_chains(tmp_path):
         ("PARAM,WTMASS,0.\n", "PARAM: WTMASS is 0 and must be positive"),
         ("DMIG,A,0,6,1\nDMIG,A,1,1,,1,1,2.\nDMIG,A,1,1,,1,1,3.\n", "DMIG: the number .* twice"),
         ("GRID,9,,0.,0.,0.\nCONROD,9,1,9,1,1.\n", "CONROD: has no length"),
+        ("CELAS2,9,5.,77,0\n", "CELAS2: names the grid point 77, which is not defined"),
         ("CELAS1,9,5,1,1\n", "CELAS1: names the property 5, which is not defined"),
         ("CBUSH,9,5,1,2\n", "CBUSH: names the property PBUSH 5, which is not defined"),
         ("PBUSH,5,K,1.\nCBUSH,9,5,1\n", r"CBUSH: has no length, so it needs a .* \(CID\)"),
@@ -127,6 +128,15 @@ def test_what_stands_where_a_card_has_no_field_is_refused_and_so_are_whole_numbe
     path.write_text(f"SOL 103\nCEND\n{case}\nBEGIN BULK\n{text}{more}SPC1,1,3,1\nENDDATA\n")
     with pytest.raises(fem.ModelError, match=said):
         fem.parts_of(fem.read_structure(path))
+
+
+def test_a_bush_that_turns_corners_of_solids_is_named(tmp_path):
+    """Nothing else has rotations there, so that both ends may turn together."""
+    cards = "PBUSH,5,K,1.,1.,1.,1.,1.,1.\nCBUSH,50,5,7,20,,,,0\nGRID,20,,2.,1.,1.\n"
+    told = read(tmp_path, cards).notes
+    assert any("line 18: CBUSH 50 turns the grid point 7, whose other elements" in n for n in told)
+    flat = "PBUSH,5,K,1.,1.,1.\nCBUSH,50,5,7,21,,,,0\nGRID,21,,1.,1.,1.\n"
+    assert not read(tmp_path, flat).notes
 
 
 def test_an_equation_needs_a_first_factor(tmp_path):
