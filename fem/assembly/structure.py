@@ -249,10 +249,12 @@ def unconstrained_matrices(
 
 
 def rigid_motions_of(model: StructureModel, numbering: Numbering) -> FloatArray:
-    """Rigid motions (n, 6) of all degrees of freedom: along and about x, y and z."""
+    """Rigid motions (n, 6) of all degrees of freedom that have a place, along and about x, y, z."""
     axes = np.arange(3)
     motions = np.zeros((3 * numbering.count, 6))
     moving, turning = numbering.translation >= 0, numbering.rotation >= 0
+    for name in model.attached.placeless:
+        moving[model.mesh.nodes(name)] = False
     blocks = numbering.translation[moving]
     motions[3 * blocks[:, None] + axes] = rigid_motions(model.mesh.points[moving])
     turns = np.concatenate([numbering.rotation[turning], numbering.hinged])

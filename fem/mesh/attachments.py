@@ -332,6 +332,9 @@ class Attachments:
         Names of point sets whose nodes have rotations, also where only solids meet them.
     loose
         Names of point sets of which directions that nothing resists are held.
+    placeless
+        Names of point sets whose nodes are degrees of freedom without a place: they take no part
+        in rigid motions, and their mass has no weight and no centre.
 
     Examples
     --------
@@ -349,6 +352,7 @@ class Attachments:
     matrices: Sequence[PointMatrix] = ()
     turning: Sequence[str] = ()
     loose: Sequence[str] = ()
+    placeless: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         for each in fields(self):
@@ -363,7 +367,7 @@ class Attachments:
         names += [name for item in self.couplings for name in (item.point, item.face)]
         names += [item.point for item in self.supports]
         names += [point for item in self.matrices for point in item.points]
-        names += [*self.turning, *self.loose]
+        names += [*self.turning, *self.loose, *self.placeless]
         return tuple(dict.fromkeys(names))
 
     def __bool__(self) -> bool:
@@ -372,7 +376,7 @@ class Attachments:
     @property
     def measured(self) -> bool:
         """Whether something of it has a unit, which changes with that of the coordinates."""
-        plain = ("supports", "turning", "loose")
+        plain = ("supports", "turning", "loose", "placeless")
         return any(getattr(self, each.name) for each in fields(self) if each.name not in plain)
 
     def __str__(self) -> str:

@@ -215,7 +215,8 @@ def _attached(model: FrameModel | StructureModel, lists: Lists) -> dict[str, Any
 def _from_file(attached: dict[str, Any]) -> Attachments:
     given = attached["from file"]
     made = {name: [kind(**i) for i in given.get(name, [])] for name, kind in BROUGHT.items()}
-    return Attachments(**made, turning=given.get("turning", ()), loose=given.get("loose", ()))
+    names = {name: given.get(name, ()) for name in ("turning", "loose", "placeless")}
+    return Attachments(**made, **names)
 
 
 def _plain(item: Any) -> Any:

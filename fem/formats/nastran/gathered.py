@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from fem.base.arrays import FloatArray
 from fem.formats.content import CellBlock, MeshContent
@@ -24,6 +25,9 @@ from fem.mesh.attachments import (
 Term = tuple[str, str, float]
 OWN_NUMBERS = ("R", "CONM", "CMASS")
 """How the names of rigid elements and masses begin, which decks number by themselves."""
+GOLDEN = (5**0.5 - 1.0) / 2.0
+"""Share of a line by which points without a place follow each other, so that none meets another."""
+APART = 1e-3  # of the diagonal: distance of points without a place from others, less if it must be
 TINY = 1e-12  # of a unit vector: a component that is rounding
 
 
@@ -145,6 +149,10 @@ class Gathered:
         if self.turns:
             self.sets["grid points that turn"] = sorted(self.turns)
             turning = ("grid points that turn",)
+        scalars = [n for n in self.deck.scalars if f"node {n}" in self.sets]
+        placeless = ("scalar points",) if scalars else ()
+        if scalars:
+            self.sets["scalar points"] = scalars
         return Attachments(
             self.masses,
             self.links,
@@ -154,6 +162,7 @@ class Gathered:
             self.matrices,
             turning,
             loose,
+            placeless,
         )
 
     def _autospc(self) -> bool:
@@ -166,8 +175,8 @@ class Gathered:
         """Points, cells and names."""
         numbers = [*self.deck.grids, *self.deck.scalars]
         place = {number: i for i, number in enumerate(numbers)}
-        points = [self.deck.places[number] for number in self.deck.grids]
-        points += [np.zeros(3)] * len(self.deck.scalars)
+        points = np.array([self.deck.places[number] for number in self.deck.grids])
+        points = np.concatenate([points, _elsewhere(points, len(self.deck.scalars))])
         kinds = list(self.cells)
         blocks = [
             CellBlock(kind, np.array([[place[n] for n in c] for c in self.cells[kind]]))
@@ -182,4 +191,16 @@ class Gathered:
             name: np.unique(np.array([place[grid] for grid in grids], dtype=np.int64))
             for name, grids in self.sets.items()
         }
-        return MeshContent(np.array(points), blocks, point_sets=point_sets, cell_sets=sets)
+        return MeshContent(points, blocks, point_sets=point_sets, cell_sets=sets)
+
+
+def _elsewhere(points: FloatArray, count: int) -> FloatArray:
+    """Places (count, 3) among others (n, 3) where none of them is, for points without a place."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    tree, found, step = cKDTree(points), np.empty((0, 3)), 0
+    while len(found) < count:
+        shares = GOLDEN * np.arange(step + 1, step + 1 + count) % 1.0
+        tried = low + shares[:, None] * (high - low)
+        far = tree.query(tried)[0] > APART * np.linalg.norm(high - low) / (1 + step)
+        found, step = np.concatenate([found, tried[far]])[:count], step + count
+    return found

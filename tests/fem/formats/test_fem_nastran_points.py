@@ -345,6 +345,24 @@ def test_dampers_of_all_kinds_make_one_damping_matrix(tmp_path):
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
+def test_scalar_points_have_no_place(tmp_path):
+    """They move neither the centre of mass nor its amount, and are at no other point."""
+    cards = "SPOINT,100,THRU,140\nCELAS2,5,1000.,1,2,100\nCMASS2,6,2.,100\n"
+    cards += "".join(
+        f"CELAS2,{n},9.,{n - 1},0,{n}\nCMASS2,{n + 200},1.,{n}\n" for n in range(101, 141)
+    )
+    mesh = read(tmp_path, cards)
+    found = fem.assemble(fem.StructureModel(mesh, fem.parts_of(mesh)))  # no slit: not separate
+    plain = assembled(read(tmp_path, ""))
+    np.testing.assert_allclose(found.rigid_mass, plain.rigid_mass, rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(found.inertia.sum(axis=0), plain.inertia.sum(axis=0), atol=1e-8)
+    gaps = np.linalg.norm(mesh.points[:, None] - mesh.points, axis=2) + np.eye(len(mesh.points))
+    assert gaps.min() > 1e-4
+    found.save(tmp_path / "component.npz")
+    again = type(found).load(tmp_path / "component.npz")
+    np.testing.assert_array_equal(again.rigid_mass, found.rigid_mass)
+
+
 def test_parameters_may_stand_in_case_control(tmp_path):
     halved = assembled(read(tmp_path, "", " param, wtmass, .5"))
     assert halved.rigid_mass[0, 0] == pytest.approx(4000.0)
