@@ -21,6 +21,7 @@ SURE = Stability(0.5 + 0.2j, -0.62, 1e-7)
 class FakeSystem:
     interfaces: tuple[str, ...] = ("middle",)
     stops: tuple[object, ...] = ()
+    sliders: tuple[object, ...] = ()
     frequencies_hz: tuple[float, ...] = ()
 
     def unit(self, interface):

@@ -59,7 +59,8 @@ class Body:
 
     It rebounds from walls, and does not come to rest on them.
 
-    Modes: nan for an open one, 0 where it sticks, else the sign of its speed.
+    Modes: nan for an open one, 0 where it sticks, else the sign of its speed. Times and ways are
+    what `followed` adds up: how long each contact sticks and slides, and how far.
     """
 
     mass: Vector
@@ -69,6 +70,9 @@ class Body:
     contacts: list[Contact]
     walls: list[Wall] = field(default_factory=list)
     modes: list[float] = field(default_factory=list)
+    stuck: Vector = field(default_factory=lambda: np.zeros(0))
+    slid: Vector = field(default_factory=lambda: np.zeros(0))
+    way: Vector = field(default_factory=lambda: np.zeros(0))
 
     def acting(self, t: float, y: Vector) -> tuple[Vector, dict[int, float]]:
         """All forces, and what holds those that stick."""
@@ -173,6 +177,7 @@ class Body:
     def followed(self, y: Vector, end: float, longest: float) -> tuple[Vector, int]:
         """The state at a time, from one at zero on, and how many events there were."""
         t, count = 0.0, 0
+        self.stuck, self.slid, self.way = np.zeros((3, len(self.contacts)))
         self.begin(t, y)
         while t < end:
             events = self.events()
@@ -180,9 +185,19 @@ class Body:
                 self.rate, (t, end), y, method="DOP853", rtol=1e-12, atol=1e-15,
                 max_step=longest, events=[event for _, _, event in events],
             )  # fmt: skip
+            self.add_up(float(run.t[-1]) - t, run.y[:, -1] - y)
             t, y = float(run.t[-1]), run.y[:, -1]
             for (i, kind, _), times in zip(events, run.t_events or [], strict=True):
                 if run.status == 1 and times.size:
                     y = self.pass_event(t, y, i, kind)
                     count += 1
         return y, count
+
+    def add_up(self, time: float, change: Vector) -> None:
+        """Count a time without events, in which the state changes by so much."""
+        for i, (contact, mode) in enumerate(zip(self.contacts, self.modes, strict=True)):
+            self.stuck[i] += time * (mode == 0.0)
+            if abs(mode) == 1.0:
+                moved = float(contact.tangent @ change[: contact.tangent.size])
+                self.slid[i] += time
+                self.way[i] += abs(moved - contact.law.base_speed * time)

@@ -32,6 +32,8 @@ UNITS = {
     "max_penetration_m": "m",
     "max_penetration_rad": "rad",
     "impacts": "1",
+    "friction_loss_j": "J",
+    "stuck_share": "1",
     "stable": "1",
     "largest_multiplier": "1",
     "multiplier_angle_deg": "deg",
@@ -60,13 +62,15 @@ def orbit_columns(
     -------
     dict of str to (n,) array
         Their units are in `UNITS`: displacements of rotations are in rad, and so are penetrations
-        of stops there, in a column of their own.
+        of stops there, in a column of their own. Where there is dry friction, there are the energy
+        that all sliders dissipate in a period, and the mean of their shares of it that they stick.
     """
     columns: dict[str, list[Any]] = {
         "period": [orbit.period for orbit in orbits],
         "frequency_hz": [at_known(orbit.frequency_hz, known_hz) for orbit in orbits],
         **_sizes(orbits),
         "impacts": [orbit.impacts for orbit in orbits],
+        **_friction(orbits),
         "stable": [orbit.stable for orbit in orbits],
         "largest_multiplier": [abs(orbit.largest_multiplier) for orbit in orbits],
         "multiplier_angle_deg": [
@@ -92,6 +96,22 @@ def _sizes(orbits: Sequence[Orbit]) -> dict[str, list[float]]:
             for name, unit in deepest.items()
         },
     }
+
+
+def _friction(orbits: Sequence[Orbit]) -> dict[str, list[float]]:
+    """The columns of dry friction, if there is any."""
+    names = friction_names(orbits[0].system) if orbits else ()
+    if not names:
+        return {}
+    measures = [orbit.friction for orbit in orbits]
+    losses = [math.fsum(each.loss for each in found) for found in measures]
+    shares = [math.fsum(each.stuck for each in found) / len(found) for found in measures]
+    return dict(zip(names, (losses, shares), strict=True))
+
+
+def friction_names(system: System | None) -> tuple[str, ...]:
+    """Names of the columns of dry friction of a system, if it has any."""
+    return ("friction_loss_j", "stuck_share") if system and system.sliders else ()
 
 
 def size_names(system: System | None = None, observe: str = "") -> tuple[str, ...]:

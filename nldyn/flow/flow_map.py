@@ -771,7 +771,7 @@ class Trajectory:
         phases = _floats("phases", phases)
         if phases.ndim != 1 or not (phases[1:] >= phases[:-1]).all():
             raise SystemModelError("phases must be a list of ascending numbers")
-        first, last = self._span
+        first, last = self.span
         slack = SLACK * max(1.0, abs(last))
         if phases.size and not first - slack <= phases[0] <= phases[-1] <= last + slack:
             raise SystemModelError(
@@ -808,7 +808,7 @@ class Trajectory:
         return (inside, found.ends[::2]) if found.outcome == OK else none
 
     @cached_property
-    def _span(self) -> tuple[float, float]:
+    def span(self) -> tuple[float, float]:
         """Forcing phases at which the motion begins and ends."""
         rec = self.record
         if not rec.phase.size:

@@ -13,6 +13,8 @@ from nldyn.engine.library import Packed
 
 Real = NDArray[np.float64]
 
+FINE = 257  # points on a panel at which polynomials of its nodes are looked at
+
 # Panel kinds: 2 * (switch at the start) + (switch at the end).
 SMOOTH, ENDS_AT_SWITCH, STARTS_AT_SWITCH, BETWEEN_SWITCHES = range(4)
 
@@ -36,6 +38,8 @@ class GaussTables(NamedTuple):
         The Gauss nodes in s.
     ends_nodes, barycentric : (m + 2,)
         0, the nodes and 1, and the weights of barycentric interpolation through them.
+    derivative : (m, m + 2)
+        Derivatives by s at the nodes, from values at `ends_nodes`.
     fine_grid : (N,)
         Chebyshev points in s with both ends, four times as many.
     to_fine : (N, m + 2)
@@ -52,6 +56,7 @@ class GaussTables(NamedTuple):
     nodes: Real
     ends_nodes: Real
     barycentric: Real
+    derivative: Real
     fine_grid: Real
     to_fine: Real
     power: int
@@ -121,6 +126,7 @@ def gauss_tables(m: int, power: int = 2) -> GaussTables:
         nodes,
         ends_nodes,
         barycentric,
+        _differentiation(ends_nodes, barycentric)[1:-1],
         fine_grid,
         _interpolation(ends_nodes, barycentric, fine_grid),
         power,
@@ -132,6 +138,14 @@ def _differences(points: Real) -> Real:
     return points[:, None] - points[None, :] + np.eye(points.size)
 
 
+def _differentiation(points: Real, barycentric: Real) -> Real:
+    """Matrix that takes values at the points to derivatives of their polynomial there."""
+    found = barycentric / barycentric[:, None] / _differences(points)
+    np.fill_diagonal(found, 0.0)
+    np.fill_diagonal(found, -found.sum(axis=1))
+    return found
+
+
 def _interpolation(points: Real, barycentric: Real, targets: Real) -> Real:
     """Matrix that takes values at the points to values of their polynomial at the targets."""
     distance = targets[:, None] - points[None, :]
@@ -140,3 +154,32 @@ def _interpolation(points: Real, barycentric: Real, targets: Real) -> Real:
     weights[hit.any(axis=1)] = 0.0
     weights[hit] = 1.0
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def peaks(values: Real) -> Real:
+    """Largest value of each row (p,), by the parabola through three samples.
+
+    Examples
+    --------
+    >>> x = np.linspace(0.0, 1.0, 11)
+    >>> float(peaks(1.0 - (x[None] - 0.33) ** 2)[0].round(12))
+    1.0
+    """
+    if not len(values):
+        return np.empty(0)
+    middle = np.clip(values.argmax(axis=1), 1, values.shape[1] - 2)
+    before, here, after = (
+        np.take_along_axis(values, (middle + k)[:, None], axis=1)[:, 0] for k in (-1, 0, 1)
+    )
+    bend = before - 2.0 * here + after
+    lean = 0.5 * (after - before)
+    inside = (bend < 0.0) & (np.abs(lean) <= -bend)
+    top = here - 0.5 * lean**2 / np.where(inside, bend, -1.0)
+    return np.where(inside, top, values.max(axis=1))
+
+
+@lru_cache(maxsize=8)
+def fine_table(nodes: int) -> Real:
+    """Matrix (FINE, nodes): the polynomial through values at the Gauss nodes, at equal steps."""
+    fine = legendre.legvander(np.linspace(-1.0, 1.0, FINE), nodes - 1)
+    return np.asarray(fine @ gauss_tables(nodes).to_legendre)

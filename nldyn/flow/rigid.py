@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.flow.flow_map import FlowMap, Trajectory
+from nldyn.flow.sliding import held_in_pieces
 from nldyn.system.friction import Slider
 from nldyn.system.round_stop import RoundStop
 
@@ -193,12 +194,13 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
         else:
             rates -= pushed[:, None] * data.force[:, i]
     first = len(system.stops)
-    slips = np.zeros((len(phases), len(system.sliders)), dtype=bool)
+    holds = np.zeros((len(phases), len(system.sliders)), dtype=bool)
     for i, slider in enumerate(system.sliders, first):
+        friction = rec.force[piece, i]
+        acts, sticks = friction.any(axis=1), held_in_pieces(motion, i)[piece]
+        holds[:, i - first] = acts & sticks
         speed = states @ flow.rate_rows[i] - slider.friction.base_speed
-        moves = np.abs(speed) > STILL * (np.abs(states) @ np.abs(flow.rate_rows[i]))
-        slips[:, i - first] = moves
-        slid = np.where(moves, np.sign(speed) * slider.friction.at(speed), 0.0)
+        slid = np.where(sticks, 0.0, np.sign(friction.sum(axis=1)) * slider.friction.at(speed))
         rates -= (slid * _normal_force(flow, slider, states))[:, None] * data.force[:, i]
     for i, bond in enumerate(system.bonds, first + len(system.sliders)):
         pulled = bond.force(states @ flow.rows[i], states @ flow.rate_rows[i])
@@ -208,7 +210,7 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
     pace = states @ data.rows[2, acting].T + rates @ rows.T
     mobility = rows @ data.force[:, acting]
     for k in np.flatnonzero(rests.any(axis=1)):
-        held = np.flatnonzero(np.r_[rests[k], ~slips[k] & _pressed(flow, states[k])])
+        held = np.flatnonzero(np.r_[rests[k], holds[k]])
         found = np.linalg.solve(mobility[np.ix_(held, held)], pace[k, held])
         forces[k, rigid[held[held < rigid.size]]] = found[held < rigid.size]
     return forces
@@ -221,9 +223,3 @@ def _normal_force(flow: FlowMap, slider: Slider, states: Real) -> Real:
     stop = flow.system.elastic_stops[slider.stop]
     row, rate = flow.rows[slider.stop], flow.rate_rows[slider.stop]
     return stop.force(states @ row - stop.gap, states @ rate)
-
-
-def _pressed(flow: FlowMap, state: Real) -> NDArray[np.bool_]:
-    """Which sliders something presses on."""
-    forces = [_normal_force(flow, slider, state[None])[0] for slider in flow.system.sliders]
-    return np.array(forces, dtype=float) > 0.0

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.base.optional import optional
 from nldyn.flow.flow_map import FlowMap
+from nldyn.flow.gauss import fine_table, peaks
 from nldyn.flow.rigid import rigid_impacts
 from nldyn.longterm.simulation import Motion, end_state, motion_of
 from nldyn.orbits.orbit import Orbit
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     import pandas
 
 AT_ONCE = 4000  # panels
-FINE = 257  # points on a panel at which its polynomials are looked at
 
 UNITS = {
     "stop": "1",
@@ -294,7 +292,7 @@ def _table_of_block(
     nodal = pieces.force[panels, stop]
     nodes = pieces.time[panels, None] + pieces.duration[panels, None] * flow.tables.chi[kind]
     rate = _rates(flow, motion.states(nodes.ravel()), stop).reshape(nodes.shape)
-    fine = _fine_table(flow.options.panel_nodes)
+    fine = fine_table(flow.options.panel_nodes)
     depth, force = pieces.depth[panels, stop] @ fine.T, nodal @ fine.T
     work = 0.5 * (force[:, 1:] + force[:, :-1]) * np.diff(depth, axis=1)
     return PanelTable(
@@ -303,36 +301,14 @@ def _table_of_block(
         np.einsum("pm,pm->p", weights, nodal**2),
         np.maximum(work, 0.0).sum(axis=1),
         np.einsum("pm,pm,pm->p", weights, nodal, rate),
-        _peaks(depth),
-        _peaks(force),
+        peaks(depth),
+        peaks(force),
     )
 
 
 def _rates(flow: FlowMap, modal: Real, stop: int) -> Real:
     """Rates of penetration (k,) of modal displacements and velocities (k, 2n)."""
     return flow.system.depth_and_speed(flow.system.stops[stop], modal)[1]
-
-
-def _peaks(values: Real) -> Real:
-    """Largest value of each row (p,), by the parabola through three samples.
-
-    Examples
-    --------
-    >>> x = np.linspace(0.0, 1.0, 11)
-    >>> float(_peaks(1.0 - (x[None] - 0.33) ** 2)[0].round(12))
-    1.0
-    """
-    if not len(values):
-        return np.empty(0)
-    middle = np.clip(values.argmax(axis=1), 1, values.shape[1] - 2)
-    before, here, after = (
-        np.take_along_axis(values, (middle + k)[:, None], axis=1)[:, 0] for k in (-1, 0, 1)
-    )
-    bend = before - 2.0 * here + after
-    lean = 0.5 * (after - before)
-    inside = (bend < 0.0) & (np.abs(lean) <= -bend)
-    top = here - 0.5 * lean**2 / np.where(inside, bend, -1.0)
-    return np.where(inside, top, values.max(axis=1))
 
 
 def _of_stop(motion: Motion, pieces: _Pieces, stop: int) -> dict[str, NDArray[Any]]:
@@ -432,13 +408,3 @@ def _largest(group: NDArray[np.intp], values: Real, count: int) -> Real:
     largest = np.zeros(count)
     np.maximum.at(largest, group, values)
     return largest
-
-
-@lru_cache(maxsize=8)
-def _fine_table(nodes: int) -> Real:
-    """Matrix (FINE, nodes): the polynomial through values at the Gauss nodes, at equal steps."""
-    x, w = legendre.leggauss(nodes)
-    degrees = np.arange(nodes)
-    to_legendre = (0.5 * (2 * degrees + 1))[:, None] * legendre.legvander(x, nodes - 1).T * w
-    fine = legendre.legvander(np.linspace(-1.0, 1.0, FINE), nodes - 1)
-    return np.asarray(fine @ to_legendre)

@@ -21,6 +21,7 @@ from nldyn.flow.rigid import (
     rigid_impacts,
     series_to_rest,
 )
+from nldyn.flow.sliding import SliderMeasures, slider_measures
 from nldyn.orbits.history import History
 from nldyn.orbits.multipliers import (
     COARSE,
@@ -487,6 +488,11 @@ class Orbit:
             of_stop = self._rigid_list if stop.impulsive else self._elastic_list
             found += of_stop(index)
         return tuple(sorted(found, key=lambda impact: impact.time))
+
+    @cached_property
+    def friction(self) -> tuple[SliderMeasures, ...]:
+        """What each of the `System.sliders` does in a period of the orbit."""
+        return slider_measures(self.trajectory)
 
     def _elastic_list(self, index: int) -> list[Impact]:
         """Contact peaks at a stop that gives way."""

@@ -16,8 +16,9 @@ from nldyn.system.system import System
 LENGTHS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 ANGLES = ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "µrad"), (1e-9, "nrad"))
 FORCES = ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN"), (1e-6, "µN"))
+ENERGIES = ((1e3, "kJ"), (1.0, "J"), (1e-3, "mJ"), (1e-6, "µJ"), (1e-9, "nJ"))
 MOMENTS = tuple((factor, f"{name} m") for factor, name in FORCES)
-PREFIXED = {"m": LENGTHS, "rad": ANGLES, "N": FORCES, "N m": MOMENTS}
+PREFIXED = {"m": LENGTHS, "rad": ANGLES, "N": FORCES, "N m": MOMENTS, "J": ENERGIES}
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ def direction_of(system: System, interface: str, told: str = "") -> str:
 
 
 def unit_in(measure: str, largest: float, chosen: str | None = None) -> tuple[float, str]:
-    """Choose the unit for values in m, rad, N or N m up to a largest one; in another, that.
+    """Choose the unit for values in m, rad, N, N m or J up to a largest one; in another, that.
 
     Raises
     ------

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from nldyn.plot.diagram import branch_curve, stability_runs
 from nldyn.plot.words import FORCES, Along, unit_in
-from nldyn.system.naming import stop_name
+from nldyn.system.naming import slider_name, stop_name
 
 if TYPE_CHECKING:
     from nldyn.bifurcations.point import BranchNode
@@ -36,8 +36,9 @@ def answer_lines(diagram: Diagram, special_points: Table) -> list[str]:
     Returns
     -------
     list of str
-        A line for each, of the contacts one for each kind: forces, moments, impulses; empty where
-        there is no branch. Rotations are told in rad and N m.
+        A line for each, of the contacts one for each kind: forces, moments, impulses; one of
+        friction where there is any; empty where there is no branch. Rotations are told in rad and
+        N m.
     """
     nodes = [node for branch in diagram.branches for node in branch.nodes]
     if not nodes:
@@ -48,6 +49,7 @@ def answer_lines(diagram: Diagram, special_points: Table) -> list[str]:
     return [
         _peak_line(nodes, along, diagram.observe),
         *_contact_lines(nodes, along),
+        *_friction_lines(nodes, along),
         f"stable and periodic: {_listed(stable, along)}",
         f"nothing stable was found: {_listed(gaps(stable, diagram.limits), along)}",
         f"jumps: {jumps_line(diagram.branches, special_points, along)}",
@@ -119,6 +121,29 @@ def _hardness(hit: Impact | None) -> float:
 def _hardest(orbit: Orbit, among: Sequence[int]) -> Impact | None:
     """The hardest contact of an orbit with some stops."""
     return max((hit for hit in orbit.impact_list if hit.stop in among), key=_hardness, default=None)
+
+
+def _friction_lines(nodes: Sequence[BranchNode], along: Along) -> list[str]:
+    """The largest loss of a slider in a period of the excitation, if there are any."""
+    system = nodes[0].orbit.system
+    if not system.sliders:
+        return []
+
+    def loss(node: BranchNode) -> float:
+        return max(each.loss for each in node.orbit.friction) / node.orbit.period
+
+    def told(node: BranchNode) -> str:
+        found = node.orbit.friction
+        most = max(range(len(found)), key=lambda number: found[number].loss)
+        place = f", {slider_name(system, most)}" if len(found) > 1 else ""
+        factor, unit = unit_in("J", loss(node))
+        lost = f"{loss(node) / factor:.4g} {unit} per excitation period"
+        return f"{lost} at {along.told(node.value)}{place}"
+
+    name = "largest loss by friction"
+    if not any(map(loss, nodes)):
+        return [f"{name}: none, nothing slides"]
+    return [f"{name}: " + _of_stable_and_all(nodes, loss, told)]
 
 
 def _of_stable_and_all(

@@ -15,19 +15,29 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError
 from nldyn.bifurcations.kinds import title_of
 from nldyn.branches.branch import Branch
+from nldyn.longterm.impacts import units_where
 from nldyn.orbits.axis import Axis
 from nldyn.orbits.harmonics import harmonics
 from nldyn.orbits.orbit import Orbit
 from nldyn.plot.diagram import beside_stable, orbit_title, stop_places
 from nldyn.plot.orbit import FLOOR, drawn_phases, motion_at
 from nldyn.plot.words import Along
-from nldyn.system.naming import stop_name
+from nldyn.system.naming import slider_name, stop_name
 
 MOST_POINTS = 120  # that can be looked at, beside the special points
 MOST_SPECIAL = 600
 STEPS = 300  # equal steps of a time history in each period of the excitation
 SAMPLES = (300, 1500)  # of a time history, at least and at most
 ALL_SAMPLES = 180_000  # of the time histories of a page, about
+OF_SLIDERS = {
+    "largest friction": "N",
+    "distance": "m",
+    "stuck": "share",
+    "slid": "share",
+    "open": "share",
+    "loss": "J",
+    "pressed distance": "N m",
+}
 SHOWN_INSTANTS = 36  # of a period, at which the structure is shown deflected
 
 
@@ -174,7 +184,7 @@ def orbit_content(
 
 
 def _motion(orbit: Orbit, samples: int) -> dict[str, Any]:
-    """Displacement, velocity and contact forces over a period, and all impacts."""
+    """Displacement, velocity and contact forces over a period, all impacts, and what slides."""
     phases = drawn_phases(orbit, min(STEPS * orbit.period, samples // 2))
     phases = phases[even(phases.size, samples)]
     states = drawn_states(orbit, phases)
@@ -189,6 +199,14 @@ def _motion(orbit: Orbit, samples: int) -> dict[str, Any]:
         "impacts": [
             [hit.time, hit.stop, hit.penetration, hit.force, hit.speed, hit.impulse]
             for hit in orbit.impact_list
+        ],
+        "friction": [
+            [
+                slider_name(orbit.system, number),
+                *(each.peak_force, each.distance, each.stuck, each.slid, each.open),
+                *(each.loss, each.pressed_distance),
+            ]
+            for number, each in enumerate(orbit.friction)
         ],
     }
 
@@ -263,6 +281,13 @@ def stops_of(orbit: Orbit) -> dict[str, Any]:
         "names": [stop_name(system, index) for index in range(len(system.stops))],
         "turn": [system.unit(stop.at) == "rad" for stop in system.stops],
     }
+
+
+def friction_columns(orbit: Orbit) -> list[str]:
+    """Heads of the table of what sliders do in a period."""
+    turns = np.array([orbit.system.unit(slider.at) == "rad" for slider in orbit.system.sliders])
+    units = units_where(OF_SLIDERS, turns) | {"pressed distance": "N m"}
+    return ["slider", *(f"{name} ({unit})" for name, unit in units.items())]
 
 
 def known(value: float) -> float | None:

@@ -31,6 +31,7 @@ from nldyn.report.orbit_content import (
     ChosenOrbit,
     chosen_orbits,
     even,
+    friction_columns,
     known,
     modal_motion,
     orbit_content,
@@ -150,6 +151,7 @@ def write_page(
         "special": special_marks(told, along, factor, unit),
         "kinds": {kind: title_of(kind) for kind in kinds},
         "stops": stops_of(branches[0].points[0]) if branches else NO_STOPS,
+        "friction": friction_columns(branches[0].points[0]) if branches else [],
         "orbits": orbits,
         "tables": {
             "special points": special_table(tables["special_points"], along, factor, unit),

@@ -19,7 +19,7 @@ from nldyn.base.version import software_version
 from nldyn.bifurcations.normal_forms import normal_form
 from nldyn.branches.cascades import cascades_in
 from nldyn.branches.endings import Ending
-from nldyn.branches.tables import at_known, orbit_columns, size_names
+from nldyn.branches.tables import at_known, friction_names, orbit_columns, size_names
 from nldyn.io.store import save
 from nldyn.plot.diagram import save_diagram
 from nldyn.report.answer import answer_lines
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from nldyn.search.exploration import Exploration
 
 DISPLACEMENT, PENETRATION = "max_abs_displacement", "max_penetration"  # without their units
+FRICTION = "friction"  # its columns, where there is any
 BRANCH_COLUMNS = (
     "branch",
     "point",
@@ -47,6 +48,7 @@ BRANCH_COLUMNS = (
     DISPLACEMENT,
     PENETRATION,
     "impacts",
+    FRICTION,
     "stable",
     "largest_multiplier",
     "multiplier_angle_deg",
@@ -168,11 +170,15 @@ def tables_of(diagram: Diagram) -> dict[str, Table]:
 
 
 def columns_of(columns: tuple[str, ...], diagram: Diagram) -> tuple[str, ...]:
-    """Columns with that of the parameter before the frequency, and sizes with their units."""
+    """Columns with that of the parameter before the frequency, sizes with units, and friction."""
     system = diagram.branches[0].points[0].system if diagram.branches else None
     displacement, *penetrations = size_names(system, diagram.observe)
-    sizes = {DISPLACEMENT: [displacement], PENETRATION: penetrations}
-    named = [name for column in columns for name in sizes.get(column, [column])]
+    given = {
+        DISPLACEMENT: [displacement],
+        PENETRATION: penetrations,
+        FRICTION: friction_names(system),
+    }
+    named = [name for column in columns for name in given.get(column, [column])]
     at = named.index("frequency_hz")
     return (*named[:at], *dict.fromkeys((parameter_name(diagram.parameter), *named[at:])))
 

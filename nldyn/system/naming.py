@@ -73,6 +73,22 @@ def _round_name(system: System, stop: RoundStop) -> str:
     return name if len(alike) == 1 else f"{name}, clearance {stop.clearance:g} m"
 
 
+def slider_name(system: System, number: int) -> str:
+    """Name one of the sliders by its interfaces, and by the stop that presses it on.
+
+    Examples
+    --------
+    >>> from nldyn import Stop, System
+    >>> system = System.from_modal([10.0, 20.0], {"x": [1.0, 0.0], "y": [0.0, 1.0]},
+    ...     stops=[Stop.linear("x", 1e6, tangent="y", friction=0.3)])
+    >>> slider_name(system, 0)
+    "friction at 'y', stop at 'x'"
+    """
+    slider = system.sliders[number]
+    name = f"friction at '{slider.at}'" + (f" against '{slider.against}'" if slider.against else "")
+    return f"{name}, {stop_name(system, slider.stop)}" if slider.stop >= 0 else name
+
+
 def quoted(names: Sequence[str]) -> str:
     """Some names in a sentence.
 

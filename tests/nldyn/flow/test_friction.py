@@ -221,6 +221,12 @@ def test_a_block_on_friction_rests_against_a_wall_and_is_let_go():
     orbit = solve_orbit(pushed(3.0), 0.3 / (2.0 * math.pi))
     assert orbit.rests
     assert orbit.flow_error.state < 1e-8
+    history = orbit.history(500)
+    resting = history.force[:, 0] != 0.0
+    assert 0.1 < resting.mean() < 0.9
+    # the wall alone holds it: what pulls, less the spring
+    pull = 2.0 + 3.0 * np.cos(orbit.omega * history.time) - 0.5
+    np.testing.assert_allclose(history.force[resting, 0], pull[resting], atol=1e-9)
 
 
 def test_friction_of_zero_changes_nothing():

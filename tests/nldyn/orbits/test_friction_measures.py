@@ -1,0 +1,154 @@
+"""What sliders do in a period: against closed forms, the balance of energy, and integration."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+from sliding import Body, Contact, Wall
+
+from nldyn import HarmonicForce, RigidStop, Stop, System, continue_branch, impacts, solve_orbit
+from nldyn.branches.tables import UNITS, orbit_columns
+from nldyn.report.answer import answer_lines
+from nldyn.report.offline import unpacked
+from nldyn.report.results import tables_of, write_results
+from nldyn.search.diagram import Diagram
+from nldyn.system import DryFriction, Friction
+
+MASS = np.diag([1.0, 2.0, 1.5])
+STIFFNESS = np.array([[3.0, -1.0, 0.0], [-1.0, 3.0, -0.5], [0.0, -0.5, 2.0]])
+DAMPING = 0.05 * STIFFNESS + 0.02 * MASS
+FORCES = np.array([2.0, 1.0, 0.5])
+FALLING = Friction(0.3, 0.45, 0.2, base_speed=0.1)
+NAMES = ("x", "y", "z")
+
+
+def block(share):
+    return System.from_matrices(
+        [[1.0]], [[1.0]], {"x": [1.0]}, dampers=[DryFriction("x", 1.0, share)],
+        excitation=[HarmonicForce("x", 1.0)],
+    )  # fmt: skip
+
+
+def structure(walled):
+    """Three bodies: one slides where a spring stops another, one all the time."""
+    walls = [RigidStop("x", 0.7, 0.9, -1)] if walled else []
+    return System.from_matrices(
+        MASS, STIFFNESS, dict(zip(NAMES, np.eye(3), strict=True)), damping=DAMPING,
+        stops=[Stop("x", 60.0, 1.5, 0.3, friction=FALLING, tangent="y"), *walls],
+        dampers=[DryFriction("z", 0.5, 0.6)],
+        excitation=[HarmonicForce(name, f) for name, f in zip(NAMES, FORCES, strict=True)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("ratio", [0.6, 0.8, 1.25])
+def test_a_block_that_slides_all_the_time_loses_four_times_friction_and_amplitude(ratio):
+    """J. P. Den Hartog (1931): no stops at these ratios, and a way of four amplitudes."""
+    orbit = solve_orbit(block(0.4), ratio / (2.0 * math.pi))
+    (found,) = orbit.friction
+    size = orbit.max_abs_displacement
+    assert found.loss == pytest.approx(4.0 * 0.4 * size, rel=1e-11)
+    assert found.distance == pytest.approx(4.0 * size, rel=1e-11)
+    assert found.pressed_distance == pytest.approx(4.0 * size, rel=1e-11)  # of 1 N
+    assert found.power == pytest.approx(found.loss / orbit.duration, rel=1e-14)
+    assert found.peak_force == pytest.approx(0.4, rel=1e-12)
+    assert (found.stuck, found.slid, found.open) == pytest.approx((0.0, 1.0, 0.0), abs=1e-14)
+
+
+def test_a_block_that_is_held_loses_nothing_and_is_held_by_what_pulls_it():
+    orbit = solve_orbit(block(1.5), 0.1)
+    (found,) = orbit.friction
+    assert (found.stuck, found.slid, found.loss, found.distance) == (1.0, 0.0, 0.0, 0.0)
+    assert found.peak_force == pytest.approx(1.0, abs=abs(orbit.max_abs_displacement) + 1e-9)
+
+
+def balance_of(orbit):
+    """Work of the excitation in a period, what dampers take, and what the belt brings.
+
+    By a quadrature of our own. The impulse of friction along y is that of the springs.
+    """
+    ends = np.append(orbit.trajectory.record.phase, 2.0 * math.pi * orbit.period)
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    half = 0.5 * np.diff(ends)[:, None]
+    phases = (ends[:-1, None] + half * (1.0 + nodes)).ravel()
+    lengths = (half * weights).ravel() / orbit.omega
+    rows = np.array([orbit.system.participation[name] for name in NAMES]).T
+    places, speeds = np.split(orbit.states(phases), 2, axis=1)
+    places, speeds = places @ rows, speeds @ rows
+    work = lengths @ (np.cos(phases) * (speeds @ FORCES))
+    damped = lengths @ ((speeds @ DAMPING) * speeds).sum(axis=1)
+    return work, damped, FALLING.base_speed * (lengths @ places @ STIFFNESS[1])
+
+
+STICKING = pytest.mark.parametrize(("walled", "hz"), [(False, 0.3), (True, 0.1)])
+
+
+@STICKING
+def test_what_the_excitation_gives_is_what_dampers_friction_and_impacts_take(walled, hz):
+    orbit = solve_orbit(structure(walled), hz)
+    work, damped, brought = balance_of(orbit)
+    hits = impacts(orbit)
+    rigid = math.fsum(hits.loss[hits.stop == 1])
+    assert (rigid > 1e-2) == walled
+    lost = [found.loss for found in orbit.friction]
+    assert min(lost) > 1e-2
+    assert work + brought == pytest.approx(damped + math.fsum(lost) + rigid, rel=1e-9)
+
+
+@STICKING
+def test_shares_and_ways_are_those_of_integration_from_event_to_event(walled, hz):
+    orbit = solve_orbit(structure(walled), hz)
+    unit, at = np.eye(3), np.array([orbit.system.participation[name] for name in NAMES])
+    contacts = [Contact(unit[1], FALLING, 0.0, unit[0], 60.0, 1.5, 0.3)]
+    contacts.append(Contact(unit[2], Friction(0.6), 0.5))
+    walls = [Wall(-unit[0], 0.9, 0.7)] if walled else []
+    body = Body(
+        MASS, DAMPING, STIFFNESS, lambda t: FORCES * math.cos(orbit.omega * t), contacts, walls
+    )
+    first = orbit.states(np.array([0.0]))[0]
+    start = np.concatenate([at @ first[:3], at @ first[3:]])
+    body.followed(start, orbit.duration, 0.2 / orbit.omega)
+    assert body.stuck[0] > 0.01 * orbit.duration  # at the stop
+    for i, found in enumerate(orbit.friction):
+        assert found.stuck == pytest.approx(body.stuck[i] / orbit.duration, abs=1e-8)
+        assert found.slid == pytest.approx(body.slid[i] / orbit.duration, abs=1e-8)
+        assert found.distance == pytest.approx(body.way[i], rel=1e-8)
+        assert found.stuck + found.slid + found.open == pytest.approx(1.0, abs=1e-14)
+
+
+@pytest.fixture(scope="module")
+def diagram_of_block():
+    limits = (0.06, 0.1)
+    branch = continue_branch(solve_orbit(block(0.4), 0.1), limits)
+    return Diagram((branch,), limits, "x")
+
+
+def test_tables_and_answer_tell_the_loss_of_a_period_and_how_long_it_sticks(diagram_of_block):
+    orbits = diagram_of_block.branches[0].points
+    table = orbit_columns(orbits)
+    sizes = table["max_abs_displacement_m"]
+    np.testing.assert_allclose(table["friction_loss_j"], 1.6 * sizes, rtol=1e-9)  # symmetric
+    assert table["stuck_share"].min() == 0.0 and table["stuck_share"].max() > 0.3
+    assert (UNITS["friction_loss_j"], UNITS["stuck_share"]) == ("J", "1")
+    line = answer_lines(diagram_of_block, tables_of(diagram_of_block)["special_points"])[2]
+    assert line.startswith(
+        f"largest loss by friction: {1.6 * max(sizes):.4g} J per excitation period at 0.1 Hz"
+    )
+
+
+def test_the_report_has_a_row_for_each_slider_and_columns_over_the_branch(
+    diagram_of_block, tmp_path
+):
+    folder = write_results(diagram_of_block, tmp_path / "out")
+    with (folder / "branches.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    orbits = diagram_of_block.branches[0].points
+    assert [float(row["stuck_share"]) for row in rows] == [o.friction[0].stuck for o in orbits]
+    content = unpacked((folder / "report.html").read_text(encoding="utf-8"))
+    assert content["friction"][:3] == ["slider", "largest friction (N)", "distance (m)"]
+    for shown in content["orbits"]:
+        (row,) = shown["friction"]
+        told = dict(zip(content["friction"], row, strict=True))
+        assert told["slider"] == "friction at 'x'"
+        assert told["loss (J)"] == pytest.approx(1.6 * shown["y"], rel=1e-9)
+        assert told["stuck (share)"] + told["slid (share)"] == pytest.approx(1.0, abs=1e-14)
