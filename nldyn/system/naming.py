@@ -80,7 +80,7 @@ def slider_name(system: System, number: int) -> str:
     --------
     >>> from nldyn import Stop, System
     >>> system = System.from_modal([10.0, 20.0], {"x": [1.0, 0.0], "y": [0.0, 1.0]},
-    ...     stops=[Stop.linear("x", 1e6, tangent="y", friction=0.3)])
+    ...     stops=[Stop("x", 1e6, tangent="y", friction=0.3)])
     >>> slider_name(system, 0)
     "friction at 'y', stop at 'x'"
     """
