@@ -87,6 +87,8 @@ def _pbeaml(deck: Deck, card: Card, mass_factor: float) -> BeamNumbers:
     first = _shaped(card, shape, 8)
     ends, added, at = [first], [card.real(8 + count)], 9 + count
     while at < len(card.fields) and any(card.texts(at)):
+        if card.text(at) not in ("", *STATIONS):
+            raise card.fail(f"has {card.text(at)!r} in {card.field(at)}, which is YES or NO")
         share = card.real(at + 1, 1.0)
         sized = any(card.text(at + 2 + i) for i in range(count))
         here = _shaped(card, shape, at + 2) if sized else first

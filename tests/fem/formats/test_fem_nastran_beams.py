@@ -254,6 +254,7 @@ def test_moments_of_inertia_that_are_missing_resist_nothing(tmp_path):
     ("prop", "said"),
     [
         ("PBAR,7,1,1.-4\n", "PBAR: its I1 and I2 and J must be positive for a beam"),
+        ("PBARL,7,1,,BAR\n,.1,.2,.3,.4\n", "PBARL: has '.4' in field 5 of its line 2, behind its"),
         ("PBARL,7,1,,HAT\n,.1,.1,.1,.1\n", "PBARL: the shape 'HAT' is not read"),
         ("PBAR,8,1,1.-4,1.-9,1.-9,1.-9\n", "PBAR 7 of CBAR in line .* is not defined"),
     ],
