@@ -22,8 +22,8 @@ class SliderMeasures:
     """What one of the `System.sliders` does in a motion, such as a period of an orbit.
 
     Where it acts on a rotation, rad stands for m, and N m for N. The instants at which it sticks,
-    slips and is let go are as exact as states need: at the default `rtol` of the flow map shares are
-    good to about 1e-8, and ways at stops to 1e-7.
+    slips and is let go are as exact as states need: at the default `rtol` of the flow map shares
+    are good to about 1e-8, and ways at stops to 1e-7.
 
     Parameters
     ----------
