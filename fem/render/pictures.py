@@ -56,6 +56,8 @@ AUTO_FRACTION = 0.06
 BAR_ROW = 110
 GHOST_SHRINKAGE = 0.97
 """Makes the undeformed frame a little thinner, so that the other hides it where they agree."""
+BEHIND = (2.0, 2.0e4)
+"""Factor and units of OpenGL's polygon offset: faces at rest lie behind those they agree with."""
 TRIAD = 110  # pixels
 FIELD = (0.20, 0.85, 0.94)
 SHEET_FIELD = (0.05, 0.84, 0.94)
@@ -725,7 +727,9 @@ def add_deflected(
     """Draw the deflected frame and, in grey, the undeformed frame."""
     rest, _ = drawing.place(np.zeros_like(u), shrinkage=GHOST_SHRINKAGE)
     ghost, ghost_edges = polydata(drawing, rest)
-    plotter.add_mesh(ghost, color=GHOST, opacity=0.16, lighting=False, show_scalar_bar=False)
+    pale = plotter.add_mesh(ghost, color=GHOST, opacity=0.16, lighting=False, show_scalar_bar=False)
+    pale.mapper.resolve = "polygon_offset"
+    pale.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(*BEHIND)
     plotter.add_mesh(ghost_edges, color=GHOST, opacity=0.55, line_width=1.5)
     points, _ = drawing.place(u, factor)
     surface, edges = polydata(drawing, points)

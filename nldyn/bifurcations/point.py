@@ -148,7 +148,7 @@ class SpecialPoint:
         orbit, place = self.orbit, self.place(9)
         return (
             f"<{self.kind} at {place} (error {self.error:.1g}): "
-            f"period {orbit.period}, {orbit.max_abs_displacement:.4g} m>"
+            f"period {orbit.period}, {orbit.told_size}>"
         )
 
     @property

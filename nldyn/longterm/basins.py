@@ -354,9 +354,12 @@ class Basin:
     @property
     def text(self) -> str:
         """Such as ``1: 40.0 ± 0.5 %, period 2, 1 impact, -0.001 to 0.002 m at 'a'``."""
+        return self.told(1.0, unit_of(self.attractor))
+
+    def told(self, factor: float, unit: str) -> str:
+        """The same with the extremes in a unit of a size, such as 1e-6 of µm."""
         percent = f"{100.0 * self.share:.1f} ± {100.0 * self.uncertainty:.1f} %"
-        low, high = self.attractor.span
-        unit = unit_of(self.attractor)
+        low, high = (value / factor for value in self.attractor.span)
         span = f"{low:.3g} to {high:.3g} {unit} at '{self.attractor.interface}'"
         return f"{self.number}: {percent}, {self.attractor.title}, {span}"
 

@@ -148,13 +148,19 @@ class Orbit:
     def __repr__(self) -> str:
         """One line: period, frequency, amplitude, impacts, stability."""
         try:
-            size = f"{self.max_abs_displacement:.4g} m at '{self.observe}', {self.impacts} impacts"
+            impacts = "1 impact" if self.impacts == 1 else f"{self.impacts} impacts"
+            size = f"{self.told_size} at '{self.observe}', {impacts}"
             stability: str = self.stability.verdict
         except ConvergenceError as error:
             size, stability = str(error), "stability unknown"
         if not self.resolved:
             stability += f", contacts resolved to {self.flow_error.monodromy:.1e} only"
         return f"<Orbit of period {self.period} at {self.frequency_hz:.6g} Hz: {size}, {stability}>"
+
+    @property
+    def told_size(self) -> str:
+        """The largest displacement in words, of a rotation in rad."""
+        return f"{self.max_abs_displacement:.4g} {self.system.unit(self.observe)}"
 
     @classmethod
     def of(cls, problem: ShootingProblem, found: Solution, observe: str) -> Orbit:

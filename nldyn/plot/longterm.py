@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_choice, check_types, is_finite, numbers, shown
 from nldyn.branches.branch import Branch, check_branches
-from nldyn.longterm.basins import Basins
+from nldyn.longterm.basins import Basins, unit_of
 from nldyn.longterm.impacts import units_where
 from nldyn.longterm.measures import UNITS as MEASURE_UNITS
 from nldyn.longterm.measures import SpectraMap
@@ -656,7 +656,8 @@ def _coloured(found: Basins) -> tuple[Real, list[Any]]:
     for index, basin in enumerate(found.basins):
         base = np.asarray(to_rgb(PERIOD_COLOURS[index % len(PERIOD_COLOURS)]), dtype=float)
         phases = max(basin.attractor.period, 1)
-        text = basin.text.replace(" %, ", " %\n")
+        largest = max(abs(value) for value in basin.attractor.span)
+        text = basin.told(*unit_in(unit_of(basin.attractor), largest)).replace(" %, ", " %\n")
         if phases > 1:
             handles.append(Patch(color="none", label=text))
         for phase in range(phases):

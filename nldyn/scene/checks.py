@@ -192,8 +192,8 @@ def _slow_remarks(scene: Scene, system: System) -> Iterator[str]:
         return
     if system.conservative:
         yield (
-            "nothing takes energy out, for there is neither [damping] nor a damper: motions do not "
-            "settle, and 'nldyn run' takes many times as long as with damping"
+            "nothing takes energy out, for there is neither a damper nor [damping] of a mode above "
+            "0 Hz: motions do not settle, and 'nldyn run' takes many times as long as with damping"
         )
     lowest, highest = scene.continuation.frequencies_hz[0], float(system.frequencies_hz.max())
     where = ", where range_hz begins," if scene.continuation.range_hz else ""

@@ -55,7 +55,7 @@ def _guess(fault: str, before: str, after: str) -> str:
         return "']' is likely missing at the end of the list, or a comma between two values"
     if fault.startswith(("Illegal character '\\n'", 'Expected "\'"', "Expected '\"'")):
         return "a quotation mark is likely missing"
-    if fault.startswith("Unescaped '\\'"):
+    if fault.startswith(("Unescaped '\\'", "Invalid hex value")):
         return "a path has \\: write / in its place, or single quotes around it"
     if fault.startswith("Invalid value"):
         return _guessed_value(after)
@@ -89,4 +89,6 @@ def _guessed_rest(before: str, after: str) -> str:
         return "a comma stands in place of a decimal point, or brackets are missing around a list"
     if re.search(r"\d$", before) and after.startswith("."):
         return "a digit is missing behind the decimal point: 1.0e-2, not 1.e-2"
+    if re.search(r"\d$", before.rstrip()) and re.match(r"[^\W\d_]", after):
+        return "a number stands without its unit: it is in SI units, 2.0e-4 for 0.2 mm"
     return ""

@@ -170,6 +170,19 @@ def test_pictures_of_solids_and_sheets(with_gl, bar, tmp_path):
     assert colours(iio.imread(tmp_path / "sheet.png")) > 10_000
 
 
+def test_what_does_not_move_hides_the_structure_at_rest(with_gl, bar, tmp_path, monkeypatch):
+    """Where both lie at one place, the colour of that at rest does not show through."""
+    component, u = bar
+    images = []
+    for colour in ("#ff0000", "#00ff00"):
+        monkeypatch.setattr("fem.render.pictures.GHOST", colour)
+        render_shape(component, 0.0 * u, tmp_path / "rest.png", size=(640, 360))
+        images.append(iio.imread(tmp_path / "rest.png")[..., :3].astype(int))
+    drawn = np.ptp(images[0], axis=-1) > 40
+    differ = np.abs(images[0] - images[1]).max(axis=-1) > 10
+    assert np.count_nonzero(differ) < 0.2 * np.count_nonzero(drawn)  # edges
+
+
 def test_a_comparison_says_how_far_the_two_are_apart(with_gl, bar, tmp_path):
     component, u = bar
     share = render_comparison(component, u, 0.9 * u, tmp_path / "two.png", size=(640, 360))

@@ -662,6 +662,9 @@ def test_basins_are_drawn_in_units_of_their_size(at_50_hz):
     assert ax.get_ylabel() == "velocity of middle (mm/s)"
     assert ax.xaxis.get_major_formatter()(-2e-4) == "-200"
     assert ax.yaxis.get_major_formatter()(0.02) == "20"
+    low, high = at_50_hz.basins[0].attractor.span
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert f"{1e6 * low:.3g} to {1e6 * high:.3g} µm at 'middle'" in texts[0]
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,9 @@ def test_unstable_orbits_are_dotted(plot, stable, unstable):
 def test_rotations_are_drawn_in_rad_and_newton_metres(plot, x, y, stable):
     """The numbers stay as they are."""
     turning = replace(stable.system, rotations=frozenset({"middle"}))
-    ax, same = plot(solve_orbit(turning, 25.3)), plot(stable)
+    orbit = solve_orbit(turning, 25.3)
+    ax, same = plot(orbit), plot(stable)
+    assert f"{orbit.max_abs_displacement:.4g} rad at 'middle', 1 impact, " in repr(orbit)
     assert (ax.get_xlabel(), ax.get_ylabel()) == (x, y)
     for line, other in zip(ax.lines, same.lines, strict=True):
         np.testing.assert_array_equal(line.get_xydata(), other.get_xydata())

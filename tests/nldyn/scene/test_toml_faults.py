@@ -23,6 +23,9 @@ from nldyn.scene.read import parse_scene
         ("x = 1.e-2", "a digit is missing behind the decimal point"),
         ("x = True", "true or false is likely meant, in small letters"),
         ('file = "C:\\meshes"', "write / in its place"),
+        ('file = "C:\\users\\mesh.msh"', "write / in its place"),
+        ("gap = 0.2 mm", "a number stands without its unit"),
+        ("gap = 0.2mm", "a number stands without its unit"),
         ("[modal] x = 1.0", "a new line is missing behind the name of the table"),
     ],
 )
