@@ -213,11 +213,14 @@ def deepest_state(orbit: Orbit, impact: Impact | None) -> NDArray[np.float64]:
 
 def what_is_drawn(orbit: Orbit, impact: Impact | None) -> str:
     """The title of the picture of an orbit's deepest contact."""
+    return f"{most_of(impact)} of the {orbit_title(orbit, digits=5)}"
+
+
+def most_of(impact: Impact | None) -> str:
+    """What an orbit is drawn at."""
     if impact is None:
-        what = "largest deflection"
-    else:
-        what = "hardest impact" if impact.force is None else "deepest contact"
-    return f"{what} of the {orbit_title(orbit, digits=5)}"
+        return "largest deflection"
+    return "hardest impact" if impact.force is None else "deepest contact"
 
 
 def render_modes_of(
@@ -405,7 +408,9 @@ class Drawing:
             times=phases / orbit.omega,
             period=orbit.duration,
             first=deepest / orbit.omega,
-            title=with_stops_not_drawn(what_is_drawn(orbit, impact), self.scene),
+            title=with_stops_not_drawn(
+                f"{orbit_title(orbit, digits=5)}, opened at its {most_of(impact)}", self.scene
+            ),
             heading=self.scene.title or "Deepest contact",
             mirror=_mirror(self.scene),
             colour="stress",

@@ -251,11 +251,10 @@ class Exploration:
 
     def __repr__(self) -> str:
         """One line: branches, and the share of simulated motions that they explain."""
-        count = len(self.diagram.branches)
         share = f"{100.0 * self.settled_share:.1f} % of simulated motions explained"
         ended = "" if self.finished else ", not finished"
         told = self.question.axis.told_range()
-        return f"<Exploration of {told}: {count} branches, {share}{ended}>"
+        return f"<Exploration of {told}: {counted(self.diagram.branches)}, {share}{ended}>"
 
     @property
     def coverage(self) -> tuple[Coverage, ...]:

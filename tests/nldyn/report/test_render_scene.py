@@ -40,6 +40,8 @@ def test_without_graphics_the_rest_is_written(tmp_path, monkeypatch):
     assert result.stderr == "nldyn: install libegl1\n"
     pages = {"mode_shapes.html", "deepest_contact.html"}
     assert names(out) == {"modes.csv", "scene.toml", "orbit.png", "orbit.svg"} | pages
+    page = (out / "deepest_contact.html").read_text()
+    assert " orbit at 23 Hz, opened at its deepest contact" in page  # it goes on to other instants
     with (out / "modes.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["mode"] for row in rows] == ["1", "2"]

@@ -199,6 +199,7 @@ def test_linear_system_has_one_branch_on_which_everything_settles():
     assert found.settled_share == 1.0
     assert found.unsettled_ranges() == []
     assert found.report().startswith("8 to 14 Hz: 1 branch (1 harmonic)\n")
+    assert repr(found).startswith("<Exploration of 8 to 14 Hz: 1 branch, 100.0 % ")
 
 
 def test_unstable_orbits_are_found_beside_motions(monkeypatch):
