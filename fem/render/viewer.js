@@ -290,7 +290,7 @@ void main() {
       context.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
       context.clearRect(0, 0, side, side);
       context.font = "12px system-ui, sans-serif";
-      context.textAlign = context.textBaseline = "middle";
+      [context.textAlign, context.textBaseline] = ["center", "middle"];
       context.lineWidth = 2;
       const order = [0, 1, 2].sort((a, b) => turn[2][a] - turn[2][b]);
       for (const k of order) {
