@@ -97,8 +97,9 @@ def distances_across(outer: Facets, faces: Facets) -> FloatArray:
     It lies beside the face by no more than its longest edge.
     """
     centres = middles(outer)
-    _, near = cKDTree(centres).query(middles(faces), k=min(NEAREST, len(centres)))
-    near = near.reshape(len(faces), -1)
+    count = min(NEAREST, len(centres))
+    _, near = cKDTree(centres).query(middles(faces), k=count)
+    near = near.reshape(len(faces), count)
     way = middles(faces)[:, None] - centres[near]
     away = np.einsum("fki,fi->fk", way, faces.normals)
     aside = np.linalg.norm(way - away[..., None] * faces.normals[:, None], axis=2)

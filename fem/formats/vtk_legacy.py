@@ -21,6 +21,7 @@ KINDS = {
     "vtktypeint64": "i8", "vtktypeuint64": "u8", "vtkidtype": "i4", "float": "f4", "double": "f8",
 }  # fmt: skip
 """Numbers by VTK's names; vtkIdType is written as int."""
+MESH = ("POINTS", "CELLS", "CELL_TYPES")
 COLUMNS = {"VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6, "GLOBAL_IDS": 1}
 COLUMNS |= {"PEDIGREE_IDS": 1, "EDGE_FLAGS": 1}
 """Attributes of points and cells told by a name and a kind of numbers, and their columns."""
@@ -57,6 +58,7 @@ class _Legacy:
     at: int = 0
     binary: bool = False
     new: bool = False  # of version 5: cells as a list of nodes and one of where cells begin
+    met: set[str] = field(default_factory=set)
     count: int | None = None  # of points or cells, in the section of data that is read
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     nodes: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
@@ -78,7 +80,7 @@ class _Legacy:
                 f"{self.path}: holds numbers of the type {error}, which are not read of VTK legacy"
                 " files; save it as '.vtu'"
             ) from error
-        except (ValueError, IndexError) as error:
+        except (ValueError, IndexError, OverflowError, TypeError) as error:
             if isinstance(error, ModelError):
                 raise
             raise ModelError(
@@ -96,9 +98,11 @@ class _Legacy:
         if form not in ("ASCII", "BINARY"):
             raise ValueError(f"it is neither ASCII nor BINARY, but {form[:20]!r}")
         self.binary = form == "BINARY"
-        words = self._words() or []
-        kind = " ".join(words[1:]).upper()
-        if words[:1] == ["DATASET"] and kind != "UNSTRUCTURED_GRID":
+        words = [word.upper() for word in self._words() or []]
+        kind = " ".join(words[1:])
+        if words[:1] != ["DATASET"]:
+            raise ValueError(f"{' '.join(words)[:40]!r} stands where DATASET is due")
+        if kind != "UNSTRUCTURED_GRID":
             raise ModelError(
                 f"{self.path}: holds {kind}, no unstructured grid;"
                 " pyvista.read(file).cast_to_unstructured_grid().save('mesh.vtu') makes it one"
@@ -123,6 +127,10 @@ class _Legacy:
         elif keyword in COLUMNS:
             self._array(words[0], words[1], self._rows(), COLUMNS[keyword])
         elif keyword in readers:
+            if keyword in MESH:
+                if keyword in self.met:
+                    raise ValueError(f"{keyword} stands twice")
+                self.met.add(keyword)
             readers[keyword](*words)
         else:
             raise ValueError(f"{keyword[:40]!r} is not understood")

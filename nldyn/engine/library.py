@@ -18,10 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cython_blas
 
+from nldyn.engine.layout import FIRST_POWER, SLIDING_TURNS
+
 FOLDER = Path(os.environ.get("NLDYN_ENGINE", Path(__file__).parent)).resolve()  # of sanitizers
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 _first_byte: Any = ctypes.c_char.from_buffer
-NOT_BUILT = "the engine of nldyn is not built: 'pip install .' or '-e .' does so"
+REBUILT = "'pip install .' or '-e .' builds it"
+NOT_BUILT = f"the engine of nldyn is not built: {REBUILT}"
+LAYOUT = 100 * FIRST_POWER + SLIDING_TURNS  # as `nldyn_layout` of the engine
 
 
 def library_name(level: str = "") -> str:
@@ -35,6 +39,8 @@ def _load() -> ctypes.PyDLL:
     if not base.exists():
         raise ImportError(f"{NOT_BUILT} (no {base})")
     library = ctypes.PyDLL(str(base))
+    if not hasattr(library, "nldyn_layout") or library.nldyn_layout() != LAYOUT:
+        raise ImportError(f"the engine of nldyn, {base}, is older than its sources: {REBUILT}")
     wider = FOLDER / library_name("v3")
     baseline = os.environ.get("NLDYN_PROCESSOR") == "baseline"
     if wider.exists() and library.nldyn_runs_v3() and not baseline:

@@ -12,6 +12,8 @@ from fem.formats.nastran.cards import CASES, Line
 
 CHOICES = ("SPC", "MPC", "K2GG", "M2GG", "B2GG", "K2PP", "M2PP", "B2PP", "AUTOSPC")
 BEGIN = re.compile(r"\s*BEGIN(\s+BULK|\s*$|\s+\w+\s*=)", re.IGNORECASE)
+GOES_ON = re.compile(r"\s*[KMB]2(GG|PP)\s*=.*,$", re.IGNORECASE)
+"""A line whose sum of matrices goes on in the next one."""
 PARAM = re.compile(r"\s*PARAM\s*,", re.IGNORECASE)
 """A card that may stand before the bulk data, too."""
 SUPER = re.compile(r"\s*BEGIN\s+(BULK\s+)?(SUPER|AUXMODEL)\s*=", re.IGNORECASE)
@@ -49,8 +51,11 @@ class Control:
 
     def choices(self, name: str) -> list[Choice]:
         """What the cases choose, each value once: a case's own choice, or that above all cases."""
-        each = [case.get(name, self.above.get(name)) for case in self.cases or [{}]]
-        return list({choice.value: choice for choice in each[::-1] if choice}.values())[::-1]
+        found: dict[str, Choice] = {}
+        for case in self.cases or [{}]:
+            if choice := case.get(name, self.above.get(name)):
+                found.setdefault(choice.value, choice)
+        return list(found.values())
 
 
 def divided(lines: Sequence[Line], source: Path) -> tuple[Control, list[Line], list[Line]]:
@@ -74,11 +79,16 @@ def divided(lines: Sequence[Line], source: Path) -> tuple[Control, list[Line], l
         bulk = [*parameters, *lines[starts[0] + 1 :]]
         begun: Line | None = None
         for line in before:
-            if begun is not None:  # a line that ends with a comma goes on in the next one
+            if begun is not None:
                 line = Line(begun.text + line.text, begun.file, begun.number)
-            begun = line if line.text.endswith(",") and not PARAM.match(line.text) else None
+            begun = line if GOES_ON.match(line.text.rstrip()) else None
             if begun is None:
                 _read(control, line, source)
+        if begun is not None:
+            raise ModelError(
+                f"{source}: {begun.place(source)}: {begun.text.strip()}: ends with a comma, and no"
+                " line goes on; take the comma away"
+            )
     other = [line for line in lines if SUPER.match(line.text)]
     return control, bulk, other
 

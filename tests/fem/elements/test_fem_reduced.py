@@ -164,3 +164,18 @@ def test_reduced_integration_of_cells_that_have_none_is_refused():
         fem.StructureModel(mesh, {"block": fem.SolidPart(STEEL, integration="reduced")})
     with pytest.raises(fem.ModelError, match="integration must be one of 'full', 'reduced', not"):
         fem.SolidPart(STEEL, integration="R")
+
+
+def test_cells_in_full_that_lie_inside_others_have_no_face_to_look_below():
+    """What looks below faces for cells that lock finds none there, and ends in no error."""
+    box = fem.box_mesh("block", (3.0, 3.0, 3.0), (3, 3, 3), kind="hexahedron20")
+    inside = np.arange(27) == 13
+    groups = {
+        name: {"hexahedron20": np.flatnonzero(own)}
+        for name, own in (("inner", inside), ("outer", ~inside))
+    }
+    steel = fem.Material(2.1e11, 7800.0, 0.3)
+    parts = {"inner": fem.SolidPart(steel, integration="full"), "outer": fem.SolidPart(steel)}
+    mesh = fem.StructureMesh(box.points, dict(box.cells), groups)
+    mass = fem.assemble(fem.StructureModel(mesh, parts)).rigid_mass
+    assert mass[0, 0] == pytest.approx(27.0 * 7800.0)

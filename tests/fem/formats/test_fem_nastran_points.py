@@ -211,6 +211,7 @@ def test_case_control_chooses_supports_and_all_else_is_told(tmp_path):
         ("SPC = 1\nK2GG = A\nSUBCASE 1\nK2GG = B", 3.0, "DMIG A"),
         ("SPC = 1\nK2GG = (2.0*A,\n 0.5*B)\nSUBCASE 1", np.sqrt(4.0 + 12.0 + 2.5), None),
         ("SPC = 1\nSUBCASE 1\nSUBCASE 2\nK2GG = B", 3.0, "DMIG A"),
+        ("SPC = 1\nLABEL = a mass,\nK2GG = B\nSUBCASE 1", 3.0, "DMIG A"),
     ],
 )
 def test_the_choice_inside_a_case_beats_that_above_all_cases(tmp_path, case, omega, said):
@@ -232,6 +233,10 @@ def test_what_other_cases_choose_is_told_and_what_one_case_chooses_twice_refused
     cards = HELD + "SPC1,7,123,1\nDMIG,A,0,6,1,0\nDMIG,B,0,6,1,0\n"
     case = "K2GG = A\nSUBCASE 1\nSPC = 1\nSUBCASE 2\nSPC = 7\nK2GG = B"
     told = " ".join(read(tmp_path, cards, case).notes)
+    again = " ".join(read(tmp_path, cards, case + "\nSUBCASE 3\nSPC = 1").notes)
+    assert "SPC = 1 of the first case that has one is taken, not SPC = 7" in again
+    with pytest.raises(fem.ModelError, match="ends with a comma, and no line goes on"):
+        read(tmp_path, cards, "K2GG = (2.0*A,")
     assert "SPC = 1 of the first case that has one is taken, not SPC = 7" in told
     assert "K2GG = A of the first case that has one is taken, not K2GG = B" in told
     with pytest.raises(fem.ModelError, match="line 4: SPC = 7: its case chooses SPC = 1 already"):

@@ -160,6 +160,27 @@ def test_packed_data_that_are_damaged_are_refused(tmp_path, form):
     assert refused > 0.7 * len(places)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("DATASET UNSTRUCTURED_GRID", "nonsense", "'NONSENSE' stands where DATASET is due"),
+        ("DATASET UNSTRUCTURED_GRID", "dataset polydata", "holds POLYDATA, no unstructured grid"),
+        ("CELL_TYPES", "POINTS 1 float\n0 0 0\nCELL_TYPES", "POINTS stands twice"),
+    ],
+)
+def test_what_is_not_understood_in_a_legacy_file_is_told(tmp_path, old, new, said):
+    path = tmp_path / "two.vtk"
+    text = (
+        "# vtk DataFile Version 3.0\ntwo\nASCII\nDATASET UNSTRUCTURED_GRID\n"
+        "POINTS 2 float\n0 0 0 1 0 0\nCELLS 1 3\n2 0 1\nCELL_TYPES 1\n3\n"
+    )
+    path.write_text(text)
+    assert fem.read_structure(path).cells["line"].tolist() == [[0, 1]]
+    path.write_text(text.replace(old, new))
+    with pytest.raises(fem.ModelError, match=said):
+        fem.read_structure(path)
+
+
 def test_cells_with_a_wrong_number_of_nodes_are_refused(tmp_path):
     path = tmp_path / "cells.vtk"
     path.write_text(

@@ -43,6 +43,7 @@ def test_what_python_and_c_share_is_the_same():
     assert [getattr(layout, name) for name in outcomes] == list(range(len(outcomes)))
     columns = re.findall(r"\w+", written("engine.h", r"enum Column \{(.*?)\}"))
     assert columns == [*map(str.upper, layout.StopRow._fields), "FIRST_POWER"]
+    assert library.LIBRARY.nldyn_layout() == library.LAYOUT
     assert float(written("engine.h", r"#define ROUND (\S+)")) == layout.ROUND
     assert float(written("response.c", r"#define NEAR (\S+)")) == linear.NEAR
 
