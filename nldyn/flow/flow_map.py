@@ -871,11 +871,12 @@ class Trajectory:
         depth, force = depth.copy(), force.copy()
         for i, rows in self.flow.round_rows.items():
             stop = self.flow.system.round_stops[i]
-            radius = np.hypot(*(rec.depth[:, row] for row in rows))
             closed = np.asarray(rec.depth[:, rows].any(axis=(1, 2))).reshape(-1, 1)
-            size = np.hypot(*(rec.force[:, row] for row in rows)) / math.hypot(1.0, stop.friction)
+            away, pushed = rec.depth[:, rows], stop.sense * rec.force[:, rows]
+            radius = np.hypot(away[:, 0], away[:, 1])
             depth[:, i] = np.where(closed, stop.sense * radius - stop.gap, 0.0)
-            force[:, i] = np.where(closed, size, 0.0)
+            radial = (away * pushed).sum(axis=1) / np.where(radius > 0.0, radius, 1.0)
+            force[:, i] = np.where(closed, radial, 0.0)
         return depth, force
 
     def contact_quadrature(self) -> tuple[Real, Real]:
