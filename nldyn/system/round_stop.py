@@ -16,6 +16,7 @@ from nldyn.system.stop import Stop
 from nldyn.system.values import check_finite, check_not_negative, check_positive
 
 _CENTRES = ("first_eccentricity", "second_eccentricity")
+_NUMBERS = ("stiffness", "clearance", "exponent", "dissipation", "friction", "surface_speed")
 
 
 class Polar(NamedTuple):
@@ -143,6 +144,9 @@ class RoundStop:
                 "turn would stick, which round clearances do not know"
             )
         _ = self.normal
+        object.__setattr__(self, "inside", bool(self.inside))
+        for name in _NUMBERS:
+            object.__setattr__(self, name, float(getattr(self, name)))
 
     @cached_property
     def normal(self) -> Stop:
