@@ -26,6 +26,7 @@ MOST_STARTS = 100  # in the search for all rest positions
 SAME = 1e-6  # share of their size by which two of them may differ
 FARTHEST = 1e9  # m kg^0.5, where a motion counts as running away
 BALANCED = 1e-9  # share of the forces that may be left at rest
+RISES = 20  # steps in which the friction of round clearances grows from none
 SHARE = 0.1  # of the decrease that the slope foretells, with which a step is taken
 DOUBLINGS, SEEN = 20.0, 1e-12  # of the steps that look for a fall of the energy; one that is seen
 FIRST_MOVE = 1e-3  # of the way to where the energy rises again: the start of a descent
@@ -144,10 +145,15 @@ def _rests_of_bonds(system: System, push: Real) -> Iterator[Real]:
 
 def _balanced(system: System, push: Real, q: Real) -> bool:
     """Whether the forces at q cancel."""
+    size = _sum_of_forces(system, push, q)
+    return float(np.linalg.norm(force_at(system, push, q))) <= BALANCED * size
+
+
+def _sum_of_forces(system: System, push: Real, q: Real) -> float:
+    """Sum of the sizes of all forces at q, friction left out."""
     parts = [push, system.stiffness @ q]
     parts += [stop_force * c for c, stop_force in _pushes(system, q)]
-    size = sum(float(np.linalg.norm(part)) for part in parts)
-    return float(np.linalg.norm(force_at(system, push, q))) <= BALANCED * size
+    return sum(float(np.linalg.norm(part)) for part in parts)
 
 
 def _pushes(system: System, q: Real) -> Iterator[tuple[Real, float]]:
@@ -299,8 +305,8 @@ def _way_round(system: System, stop: RoundStop, q: Real, way: Real) -> tuple[flo
 
 
 def _newton_step(system: System, stiffness: Real, slope: Real) -> Real:
-    """Newton's step, with bonds away from maxima, too, and none where there is no stiffness."""
-    if not system.bonds:
+    """Newton's step, with bonds and pins away from maxima, and none where there is no stiffness."""
+    if not system.bonds and all(stop.inside for stop in system.round_stops.values()):
         return np.asarray(-np.linalg.lstsq(stiffness, slope, rcond=None)[0])
     values, vectors = np.linalg.eigh(stiffness)
     sizes = np.abs(values)
@@ -407,21 +413,39 @@ def _with_friction(system: System, q: Real) -> Real:
     """
     push = constant_force(system)
     rubs = any(stop.friction for stop in system.round_stops.values())
-    for _ in range(MOST_STEPS if rubs else 0):
-        force, slope = _rubbed(system, q)
-        if not np.any(force):
+    if not (rubs and np.any(_rubbed(system, q)[0])):
+        return q
+    for share in np.linspace(0.0, 1.0, RISES + 1)[1:]:
+        q = _carried_on(system, push, q, share)
+        if _left_over(system, push, q, share) > BALANCED * _sum_of_forces(system, push, q):
+            raise SystemModelError(
+                "under constant forces and the friction of a round clearance it comes to no rest "
+                "that Newton's method finds"
+            )
+    return q
+
+
+def _carried_on(system: System, push: Real, q: Real, share: float) -> Real:
+    """Where Newton's method, its steps shortened, comes from q with a share of the friction."""
+    for _ in range(MOST_STEPS):
+        friction, slope = _rubbed(system, q)
+        stiffness = tangent_stiffness(system, q) + share * slope
+        wrong = force_at(system, push, q) + share * friction
+        step = np.linalg.lstsq(stiffness, -wrong, rcond=None)[0]
+        left, size = float(np.linalg.norm(wrong)), 1.0
+        while size > SHORT and _left_over(system, push, q + size * step, share) >= left:
+            size *= 0.5
+        if size <= SHORT:
             return q
-        wrong = force_at(system, push, q) + force
-        step = np.linalg.lstsq(tangent_stiffness(system, q) + slope, -wrong, rcond=None)[0]
-        q = q + step
+        q = q + size * step
         if np.linalg.norm(step) <= SHORT * np.linalg.norm(q):
             return q
-    if rubs:
-        raise SystemModelError(
-            "under constant forces and the friction of a round clearance it comes to no rest that "
-            "Newton's method finds"
-        )
     return q
+
+
+def _left_over(system: System, push: Real, q: Real, share: float) -> float:
+    """Size of what the forces at q leave over, with a share of the friction."""
+    return float(np.linalg.norm(force_at(system, push, q) + share * _rubbed(system, q)[0]))
 
 
 def _elastic(stop: Stop | RoundStop, depth: float) -> tuple[float, float]:

@@ -311,6 +311,49 @@ def test_weight_rests_in_a_ring_beside_its_lowest_place_with_friction():
         assert math.atan2(*at.normal[0][::-1]) == pytest.approx(-math.atan(mu), abs=1e-12)
 
 
+@pytest.mark.parametrize("surface", [5.0, -5.0])
+def test_a_spring_presses_on_a_pin_where_friction_holds_it_or_nowhere(surface):
+    # it pulls to a place a beside the centre; where it rests at a distance r and an angle φ from
+    # the way there, it pulls by K (r - a cos φ) inward and by K a sin φ across, against μ N
+    e, a, k, push = np.array([0.46e-3, 0.55e-3]), 0.8e-3, 5e5, np.array([0.6, 0.8])
+    for mu, rests in ((0.3, True), (1.0, True), (1.6, False)):
+        stop = RoundStop(
+            ("x", "y"), k, CLEARANCE, 1.0, tuple(e), False, friction=mu, surface_speed=surface
+        )
+        loads = STIFFNESS * (e + a * push)
+        system = System.from_matrices(
+            MASS * np.eye(2), STIFFNESS * np.eye(2), PLANE, stops=[stop],
+            excitation=[ConstantForce(name, f) for name, f in zip("xy", loads, strict=True)],
+        )  # fmt: skip
+        if not rests:
+            with pytest.raises(SystemModelError, match="no rest"):
+                rest(system)
+            continue
+        at = system.round_polar(stop, np.append(rest(system), [0.0, 0.0])[None])
+        pressed = stop.force(at.depth)[0]
+        turn = push[0] * at.normal[0, 1] - push[1] * at.normal[0, 0]  # sin φ
+        assert pressed == pytest.approx(
+            STIFFNESS * (at.radius[0] - a * float(push @ at.normal[0])), rel=1e-9
+        )
+        # the surface pushes the body back, against the sense in which that of the body slides
+        assert STIFFNESS * a * turn == pytest.approx(math.copysign(mu * pressed, surface), rel=1e-9)
+
+
+def test_what_rests_beside_a_pin_is_held_by_its_spring_alone():
+    # where it would rest at zero the pin is in its way, beyond the pin nothing is
+    for mu in (0.0, 1.0):
+        pin = RoundStop(
+            ("x", "y"), 5e5, CLEARANCE, 1.0, (0.46e-3, 0.55e-3), False, friction=mu,
+            surface_speed=5.0,
+        )  # fmt: skip
+        system = System.from_matrices(
+            MASS * np.eye(2), STIFFNESS * np.eye(2), PLANE, stops=[pin],
+            excitation=[ConstantForce("x", 50.0), ConstantForce("y", 50.0)],
+        )  # fmt: skip
+        place = rest(system) / math.sqrt(MASS)
+        assert place == pytest.approx(np.full(2, 50.0 / STIFFNESS), rel=1e-12)
+
+
 def test_files_hold_round_stops(tmp_path):
     stop = RoundStop(
         ("x", "y"), 5e4, CLEARANCE, 1.0, (1e-4, -2e-4), friction=0.05, surface_speed=5.0,
@@ -323,6 +366,18 @@ def test_files_hold_round_stops(tmp_path):
     back = load(tmp_path / "branch.h5")[0]
     assert back.points[0].system.stops == system.stops
     assert back.points[-1].multipliers == pytest.approx(branch.points[-1].multipliers)
+
+
+def test_numbers_of_numpy_are_written_as_all_others(tmp_path):
+    plain = RoundStop(("x", "y"), 5e4, 0.5, 1.0, (0.25, 0.0), True, friction=0.5, surface_speed=5.0)
+    stop = RoundStop(
+        ("x", "y"), np.int64(50000), np.float32(0.5), np.int64(1),
+        (np.float32(0.25), np.int64(0)), np.True_, dissipation=np.float32(0.0),
+        friction=np.float32(0.5), surface_speed=np.int64(5),
+    )  # fmt: skip
+    save(continue_branch(solve_orbit(jeffcott([stop]), 12.0), (11.9, 12.1)), tmp_path / "b.h5")
+    assert load(tmp_path / "b.h5")[0].points[0].system.stops == (plain,)
+    assert repr(stop) == repr(plain)
 
 
 @pytest.mark.parametrize(
@@ -445,3 +500,22 @@ def test_impacts_of_a_motion_are_those_of_its_orbit():
     assert table.penetration[0] == pytest.approx(hit.penetration, rel=1e-5)
     assert table.peak_force[0] == pytest.approx(hit.force, rel=1e-5)
     assert table.impulse[0] > 0.0 and abs(table.loss[0]) < 1e-9 * table.work[0]
+
+
+@pytest.mark.parametrize("loss", [20.0, 60.0])
+def test_normal_forces_that_pull_count_as_such(loss):
+    flat = [Stop("x", 5e4, 1.0, CLEARANCE, direction=way, dissipation=loss) for way in (1, -1)]
+    ring = RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, dissipation=loss)
+    tables = []
+    for stops in (flat, [ring]):
+        system = System.from_matrices(
+            MASS * np.eye(2), STIFFNESS * np.eye(2), PLANE, damping=DAMPING * np.eye(2),
+            stops=stops, excitation=[HarmonicForce("x", 20.0)],
+        )  # fmt: skip
+        tables.append(impacts(simulate(system, 12.0, periods=3)))
+    sides, around = tables
+    assert len(sides) > 2
+    assert around.time == pytest.approx(sides.time, rel=1e-9)
+    # as `impacts` says how good they are
+    for name, rel in (("impulse", 1e-8), ("loss", 1e-8), ("peak_force", 1e-6), ("work", 1e-4)):
+        assert getattr(around, name) == pytest.approx(getattr(sides, name), rel=rel), name
