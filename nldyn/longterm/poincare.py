@@ -247,9 +247,9 @@ def brute_force(
     >>> found = brute_force(system, (35.0, 40.0), points=6, directions=["up"])
     >>> found.columns[1].attractor.kind  # at 36 Hz
     'chaotic'
-    >>> over = brute_force(system, (1e-6, 1e-4), parameter="gap", frequency_hz=36.0, points=2)
+    >>> over = brute_force(system, (1e-6, 1e-4), parameter="gap", frequency_hz=34.0, points=2)
     >>> [column.attractor.name for column in over.columns], over.values[:2]
-    (['period 4', 'period 1', 'period 1', 'period 4'], [1e-06, 0.0001])
+    (['period 3', 'period 1', 'period 1', 'period 3'], [1e-06, 0.0001])
     """
     flow = flow_of(system)
     check_types(directions=(directions, Sequence), options=(options, AttractorOptions, None))
