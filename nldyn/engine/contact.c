@@ -254,11 +254,12 @@ static int contact_panel(Motion *M, double phase, double h_max, Trial *trial)
 }
 
 /* share of the speed at a stop that rounding of the penetration costs in a contact so deep */
-static double lost_to_rounding(const Flow *fl, int s, const double *w, double peak, double noise)
+static double lost_to_rounding(const Flow *fl, int s, const double *w, double phase, double peak,
+                               double noise)
 {
     if (peak <= 0.0) return 0.0;
     const Stop *stop = stop_of(fl, s);
-    double p = stop->exponent, rate = stop->stiffness * stop->mobility;
+    double p = stop->exponent, rate = stop->stiffness * mobility_now(fl, s, w, phase);
     double impact_speed = sqrt(2.0 * rate * pow(peak, p + 1.0) / (p + 1.0));
     double speed = impact_speed;
     int rows[2] = {s, (int)stop->second};

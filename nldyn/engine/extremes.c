@@ -304,6 +304,7 @@ static void begin_output(Search *S, int out, int64_t more, const double *orders,
     }
     for (int p = 0; p < more; p++) {
         S->moving[0].forced[1 + fl->n_terms + p] = amplitudes[p];
+        S->moving[1].forced[1 + fl->n_terms + p] = (Complex){0.0, 0.0}; /* nothing rides there */
         S->terms[fl->n_terms + p] = (Term){STEADY, orders[p], {0.0, 0.0}};
     }
 }

@@ -140,7 +140,7 @@ static bool pass_touch(Motion *M, int stop, double here, int *status)
     const Flow *fl = M->fl;
     Impact hit = expected_contact(fl, stop, M->w, here);
     double noise = gap_noise(fl, stop, M->w);
-    if (lost_to_rounding(fl, stop, M->w, hit.peak, noise) > WORST_ROUNDING) *status = ROUNDED;
+    if (lost_to_rounding(fl, stop, M->w, here, hit.peak, noise) > WORST_ROUNDING) *status = ROUNDED;
     if (*status != GOES_ON || !(hit.peak <= 100.0 * noise)) return false;
     switch_stop(M, stop, here, M->t);
     M->closings[stop]--;

@@ -323,6 +323,13 @@ class FlowMap:
         return {stop: [stop, first + place] for place, stop in enumerate(numbers)}
 
     @cached_property
+    def stop_rows(self) -> Real:
+        """Rows of the displacements at stops, at round clearances those along both directions."""
+        stops = range(len(self.system.stops))
+        seconds = [second for _, second in self.round_rows.values()]
+        return self.rows[[*stops, *seconds]]
+
+    @cached_property
     def rate_rows(self) -> Real:
         """Rows of the outputs' velocities in flight."""
         return self.system.linear.times_block(self.rows)

@@ -482,7 +482,7 @@ def nearest_depth(orbit: Orbit) -> float:
 
 def length_unit(orbit: Orbit) -> float:
     """Displacement at a stop that goes with the size of the orbit, in m."""
-    rows = orbit.problem.flow.rows[: len(orbit.system.stops)]
+    rows = orbit.problem.flow.stop_rows
     size = orbit.problem.scale(orbit.point)
     return size * (float(np.linalg.norm(rows, axis=1).max()) if rows.size else 1.0)
 

@@ -73,7 +73,7 @@ def _touches_only(system: System, motion: Trajectory, omega: float) -> bool:
         abs(source.phasor) * (source.harmonic * omega) ** source.power
         for source in system.excitation
     )
-    reach = np.abs(motion.record.start @ motion.flow.rows[: len(system.stops)].T).max(initial=0.0)
+    reach = np.abs(motion.record.start @ motion.flow.stop_rows.T).max(initial=0.0)
     return 0.0 < force <= TOUCH * drive and depth <= TOUCH * reach
 
 

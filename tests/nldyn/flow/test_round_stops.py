@@ -27,6 +27,7 @@ from nldyn import (
     simulate,
     solve_orbit,
 )
+from nldyn.orbits.bordered import length_unit
 from nldyn.system import DryFriction
 from nldyn.system.chart import value_of, with_value
 from nldyn.system.equilibrium import rest
@@ -519,3 +520,25 @@ def test_normal_forces_that_pull_count_as_such(loss):
     # as `impacts` says how good they are
     for name, rel in (("impulse", 1e-8), ("loss", 1e-8), ("peak_force", 1e-6), ("work", 1e-4)):
         assert getattr(around, name) == pytest.approx(getattr(sides, name), rel=rel), name
+
+
+def test_a_clearance_whose_first_direction_is_held_counts_along_the_second():
+    def branch(plane):
+        held = {name: [1.0] if name == "free" else [0.0] for name in plane}
+        system = System.from_matrices(
+            [[MASS]], [[STIFFNESS]], held, damping=[[DAMPING]],
+            stops=[RoundStop(plane, 5e4, CLEARANCE, 1.0)],
+            excitation=[Unbalance("free", 1e-3)],
+        )  # fmt: skip
+        orbit = solve_orbit(system, 8.0, observe="free")
+        return length_unit(orbit), continue_branch(orbit, (7.9, 9.0))
+
+    (size, found), (other_size, other) = branch(("free", "held")), branch(("held", "free"))
+    assert other_size == size > 0.0
+    assert [point.kind for point in found.special_points] == [
+        point.kind for point in other.special_points
+    ]
+    assert "GR" in [point.kind for point in found.special_points]
+    assert other.points[-1].max_penetration == pytest.approx(
+        found.points[-1].max_penetration, rel=1e-9
+    )
