@@ -11,6 +11,7 @@ import cms
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
 from nldyn.reduction.load_case import LoadCase
+from nldyn.system.chart import with_value
 from nldyn.system.contact_law import duration_factor
 from nldyn.system.round_stop import RoundStop
 from nldyn.system.stop import Stop
@@ -153,11 +154,22 @@ def share(model: cms.ReducedModel, setting: LoadCase, number: int) -> float:
 
 
 def shortest_contact(setting: LoadCase, model: cms.ReducedModel) -> float:
-    """Duration in s of the shortest contact to be expected; infinite without a stop."""
-    system = setting.system(model)
-    omegas = 2.0 * np.pi * np.linspace(*setting.range_hz, 200)
+    """Duration in s of the shortest contact to be expected; infinite without a stop.
+
+    Where a parameter changes, it is looked for at both of its limits and halfway.
+    """
+    systems = [setting.system(model)]
+    if setting.parameter is not None:
+        axis = setting.axis(systems[0])
+        systems = [with_value(systems[0], axis.parameter, value) for value in axis.spread(3)]
+    return min(_shortest_in(system, setting.range_hz) for system in systems)
+
+
+def _shortest_in(system: System, range_hz: tuple[float, float]) -> float:
+    """The same of a system, over a range of excitation frequencies."""
+    omegas = 2.0 * np.pi * np.linspace(*range_hz, 200 if range_hz[0] < range_hz[1] else 1)
     shortest = math.inf
-    for stop in setting.stops:
+    for stop in system.elastic_stops.values():
         for c in system.stop_vectors(stop):
             row = system.displacement_row(c)
             speed = max(_fastest(system, row, float(w)) for w in omegas)

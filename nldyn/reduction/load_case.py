@@ -46,7 +46,8 @@ class LoadCase:
     Raises
     ------
     SystemModelError
-        For a range that is no range, or without excitation.
+        For a range that is no range, a frequency that is held where it changes, or without
+        excitation.
 
     Examples
     --------
@@ -70,6 +71,11 @@ class LoadCase:
     def __post_init__(self) -> None:
         if self.parameter is None:
             check_range(self.limits, "limits")
+            if self.frequency_hz is not None:
+                raise SystemModelError(
+                    "frequency_hz is held where another parameter changes: name the parameter, or "
+                    "leave it out"
+                )
         elif self.frequency_hz is None:
             name = getattr(self.parameter, "name", self.parameter)
             raise SystemModelError(f"parameter '{name}': needs frequency_hz, which is held")

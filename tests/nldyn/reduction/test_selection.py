@@ -12,11 +12,20 @@ from problems import MASSES, SETTING, string
 
 import cms
 import fem
-from nldyn import LoadCase, Stop, SystemModelError, Unbalance, select_modes, solve_orbit
+from nldyn import (
+    LoadCase,
+    Parameter,
+    RoundStop,
+    Stop,
+    SystemModelError,
+    Unbalance,
+    select_modes,
+    solve_orbit,
+)
 from nldyn.base.resources import example
 from nldyn.branches.peaks import resonance_peaks
 from nldyn.orbits.axis import Axis
-from nldyn.reduction.candidates import contact_duration
+from nldyn.reduction.candidates import candidate_modes, contact_duration
 from nldyn.reduction.model_errors import harmonic_branch, largest_force, matched, special_points_of
 from nldyn.scene.component import build_component
 from nldyn.scene.load_case import load_case_of
@@ -39,6 +48,38 @@ def test_modes_that_the_middle_cannot_see_are_dropped(selection):
         ],
         rtol=1e-9,
     )
+
+
+def test_both_directions_of_a_round_clearance_see_modes():
+    """Modes 1 to 3 move along x alone, 4 to 6 along y."""
+    rows = np.kron(np.eye(2), np.ones(3))
+    squares = (2.0 * np.pi * np.array([20.0, 50.0, 90.0, 25.0, 60.0, 100.0])) ** 2
+    plane = cms.Matrices(np.diag(squares), np.eye(6), {"x": rows[0], "y": rows[1]})
+    rub = RoundStop(("x", "y"), 1e5, 1e-3, 1.0)
+    setting = LoadCase((10.0, 70.0), stops=(rub,), excitation=(Unbalance("x", 1e-3),))
+    found = candidate_modes(plane, setting)
+    hz = found.whole.frequencies_hz
+    assert [round(float(hz[n - 1])) for n in found.seen] == [20, 25, 50, 60, 90, 100]
+
+
+def test_the_cutoff_of_a_range_of_a_parameter_does_not_depend_on_its_present_value():
+    setting = replace(
+        SETTING, limits=(1e6, 1e9), parameter=Parameter("stiffness"), frequency_hz=38.0
+    )
+    soft, stiff = (
+        replace(setting, stops=(Stop("middle", stiffness=k),)) for k in (1e6, 1e9)
+    )  # fmt: skip
+    alone = replace(stiff, limits=(38.0, 38.1), parameter=None, frequency_hz=None)
+    found = [candidate_modes(string(), case) for case in (soft, stiff, alone)]
+    assert found[0].numbers == found[1].numbers
+    assert found[0].cutoff_hz == pytest.approx(found[1].cutoff_hz, rel=1e-12)
+    # the stiffest of them has the shortest contact
+    assert found[0].contact_s == pytest.approx(found[2].contact_s, rel=0.02)
+
+
+def test_a_frequency_that_is_held_and_changes_is_refused():
+    with pytest.raises(SystemModelError, match="frequency_hz is held"):
+        LoadCase((5.0, 60.0), excitation=(Unbalance("x", 1e-3),), frequency_hz=20.0)
 
 
 def test_an_interface_that_is_not_in_use_does_not_count():
