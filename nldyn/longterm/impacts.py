@@ -71,7 +71,8 @@ class Impacts:
     work : (k,)
         Work done against the stop while the penetration grows, in J.
     loss : (k,)
-        Work done against the stop altogether, in J: rounding for a stop without dissipation.
+        Work done by normal forces against the stop altogether, in J: rounding for a stop without
+        dissipation. That of friction, of round clearances too, is left out.
     frequency_hz : (k,)
         Excitation frequency at the begin.
     """
