@@ -85,12 +85,22 @@ def describe_rest(system: System) -> list[str]:
         f"at rest: {places}",
         *(f"or at rest: {_places(system, other)}" for other in others),
         *(
-            f"at rest the stop at '{system.stops[i].at}' is closed by {depth:.6g} {unit}: "
+            f"at rest the {_short(system.stops[i])} is closed by {depth:.6g} {unit}: "
             f"{force:.6g} {moment_unit(unit)}"
             for i, depth, force in closed_at_rest(system, q)
             for unit in [system.unit(system.stops[i].at)]
         ),
     ]
+
+
+def _short(stop: AnyStop) -> str:
+    """What a stop is, and where, in a few words."""
+    from nldyn.system.naming import quoted
+    from nldyn.system.round_stop import RoundStop
+
+    if isinstance(stop, RoundStop):
+        return f"round clearance at {quoted(stop.plane)}"
+    return f"stop at '{stop.at}'"
 
 
 def _places(system: System, q: Real) -> str:

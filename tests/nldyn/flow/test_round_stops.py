@@ -27,6 +27,7 @@ from nldyn import (
     simulate,
     solve_orbit,
 )
+from nldyn.app.describe import describe_rest
 from nldyn.orbits.bordered import length_unit
 from nldyn.system import DryFriction
 from nldyn.system.chart import value_of, with_value
@@ -520,6 +521,60 @@ def test_normal_forces_that_pull_count_as_such(loss):
     # as `impacts` says how good they are
     for name, rel in (("impulse", 1e-8), ("loss", 1e-8), ("peak_force", 1e-6), ("work", 1e-4)):
         assert getattr(around, name) == pytest.approx(getattr(sides, name), rel=rel), name
+
+
+def test_a_body_rests_in_a_round_clearance_which_is_told_with_both_directions():
+    system = jeffcott([RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0)], 1e-3, ConstantForce("x", 20.0))
+    # K (c + d) + k d = 20 N
+    depth = (20.0 - STIFFNESS * CLEARANCE) / (STIFFNESS + 5e4)
+    assert describe_rest(system)[-1] == (
+        f"at rest the round clearance at 'x', 'y' is closed by {depth:.6g} m: {5e4 * depth:.6g} N"
+    )
+
+
+def test_clearances_between_bodies_in_clearances_move_as_an_independent_integration_says():
+    """Two discs, each in a ring that is held, and a ring of the first around the second."""
+    names = ("x", "y", "u", "v")
+    M, C, w = np.diag([2.0, 2.0, 1.0, 1.0]), 4.0 * np.eye(4), 2.0 * np.pi * 11.0
+    K = np.diag([8e3, 9e3, 5e3, 5e3])
+    outer = {"friction": 0.1, "surface_speed": 5.0}
+    stops = [
+        RoundStop(("x", "y"), 5e4, 1.0e-3, 1.0, (1e-4, -2e-4), **outer),
+        RoundStop(("u", "v"), 4e4, 1.5e-3, 1.0, dissipation=0.2),
+        RoundStop(("x", "y"), 6e4, 0.8e-3, 1.0, (0.0, 1e-4), against_plane=("u", "v"), **outer),
+    ]
+    system = System.from_matrices(
+        M, K, dict(zip(names, np.eye(4), strict=True)), damping=C, stops=stops,
+        excitation=[HarmonicForce("x", 12.0), HarmonicForce("y", 12.0, phase_deg=-90.0),
+                    HarmonicForce("u", 6.0)],
+    )  # fmt: skip
+    first, second = np.eye(2, 4), np.eye(2, 4, 2)
+    rings = [
+        Ring(rows, s.stiffness, s.clearance, 1.0, s.eccentricity, 1.0, s.dissipation, s.rub)
+        for rows, s in zip((first, second, first - second), stops, strict=True)
+    ]
+
+    def load_at(t):
+        return np.array([12.0, 0.0, 6.0, 0.0]) * np.cos(w * t) + np.array(
+            [0.0, 12.0, 0.0, 0.0]
+        ) * np.sin(w * t)
+
+    start = np.array([0.6e-3, 0.0, 0.1e-3, 0.2e-3, 0.0, 0.05, 0.02, 0.0])
+    modes = sla.eigh(K, M)[1]
+    basis = sla.block_diag(modes, modes)
+    flow = FlowMap(system)
+    begin = flow.to_state(np.linalg.solve(basis, start))[None]
+    found = flow.shoot(begin, PERIOD, w)
+    depth, _ = flow.trajectory(begin, PERIOD, w).contacts_at_nodes
+    assert not found.failure and depth.any(axis=(0, 2)).all()  # each of them touches
+    rotor = Rotor(M, C, K, load_at, rings)
+    end, columns, _ = rotor.followed(start, 2.0 * np.pi / w, 2.0 * np.pi / w / 400, columns=True)
+    ours = basis @ flow.to_modal(found.ends[0])
+    assert np.abs(ours - end)[:4].max() < 1e-8 * np.abs(end[:4]).max()
+    assert np.abs(ours - end)[4:].max() < 1e-8 * np.abs(end[4:]).max()
+    right, left = basis @ system.linear.right, system.linear.left @ np.linalg.inv(basis)
+    jacobian = right @ found.jacobians[0] @ left
+    assert np.abs(jacobian - columns).max() < 1e-6 * np.abs(columns).max()
 
 
 def test_a_clearance_whose_first_direction_is_held_counts_along_the_second():
