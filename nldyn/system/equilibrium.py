@@ -36,8 +36,9 @@ def rest(system: System) -> Real:
     """Modal displacements (n,) at which the structure rests when nothing but constant forces act.
 
     They are zero unless a constant force acts or a stop is closed there (a negative gap). The
-    forces have the potential ``q Ω² q / 2 - f q + Σ k δ^(m + 1) / (m + 1)``, which is convex:
-    Newton's method with shortened steps [Nocedal and Wright 2006, section 3.1] comes to its only
+    forces have the potential ``q Ω² q / 2 - f q + Σ k δ^(m + 1) / (m + 1)``, which is convex
+    but beside a pin, where the way goes downhill to one of its minima. Newton's method with
+    shortened steps [Nocedal and Wright 2006, section 3.1] comes to its only
     minimum; a body that nothing holds yet moves along the force to the next stop. A stop with a law
     of its own counts with its stiffness and exponent, a rigid one as a spring 1e8 times as stiff
     as the structure. Where polynomial springs make several minima, it is the first of
@@ -70,7 +71,19 @@ def rest(system: System) -> Real:
             f"the structure rests farther away than {FARTHEST:g} m √kg: is a constant force or "
             "the gap of the stop that holds it in the right unit?"
         )
-    return _with_friction(system, q)
+    return _with_friction(system, _off_saddles(system, q))
+
+
+def _off_saddles(system: System, q: Real) -> Real:
+    """Where the way goes on from q if a pin holds it there as on a crest, which is no rest."""
+    if all(stop.inside for stop in system.round_stops.values()):
+        return q
+    for _ in range(system.size):
+        values, vectors = np.linalg.eigh(tangent_stiffness(system, q))
+        if values[0] >= -FLAT * float(np.abs(values).max()):
+            break
+        q = _settled(system, q + FIRST_MOVE * float(np.linalg.norm(q)) * vectors[:, 0])
+    return q
 
 
 def rest_positions(system: System) -> list[Real]:

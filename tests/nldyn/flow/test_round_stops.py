@@ -356,6 +356,19 @@ def test_what_rests_beside_a_pin_is_held_by_its_spring_alone():
         assert place == pytest.approx(np.full(2, 50.0 / STIFFNESS), rel=1e-12)
 
 
+@pytest.mark.parametrize("push", [9.7, 11.0, 14.4])
+def test_what_is_pushed_straight_at_a_pin_comes_to_rest_behind_it(push):
+    # the spring's own place lies within the pin, beyond its centre
+    pin = RoundStop(("x", "y"), 5e5, CLEARANCE, 1.0, (1.2e-3, 0.0), False)
+    system = System.from_matrices(
+        MASS * np.eye(2), STIFFNESS * np.eye(2), PLANE, stops=[pin],
+        excitation=[ConstantForce("x", push)],
+    )  # fmt: skip
+    # K x + k (x - e - c) = F there
+    known = (push + 5e5 * 2.2e-3) / (STIFFNESS + 5e5)
+    assert rest(system) / math.sqrt(MASS) == pytest.approx([known, 0.0], abs=1e-12)
+
+
 def test_files_hold_round_stops(tmp_path):
     stop = RoundStop(
         ("x", "y"), 5e4, CLEARANCE, 1.0, (1e-4, -2e-4), friction=0.05, surface_speed=5.0,
