@@ -31,7 +31,7 @@ from nldyn.branches.endings import Ending, StopReason, StopReasons
 from nldyn.branches.leg import Leg, LegBuilder, Progress
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
-from nldyn.orbits.axis import chart_over
+from nldyn.orbits.axis import chosen_parameter
 from nldyn.orbits.bordered import FREE, OrbitFamily, Place, correct
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
@@ -173,7 +173,7 @@ def family_over(
     SystemModelError
         If the range is empty or does not hold the orbit, or there is no such parameter.
     """
-    chart = chart_over(orbit.system, limits, parameter)
+    chart = Chart.of(chosen_parameter(orbit.system, parameter), limits)
     value = value_of(orbit.system, orbit.frequency_hz, chart.parameter)
     slack = SLACK * max(abs(chart.low), abs(chart.high))
     if not chart.low - slack <= value <= chart.high + slack:

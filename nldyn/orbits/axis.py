@@ -33,12 +33,9 @@ from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
 
-def chart_over(
-    system: System, limits: tuple[float, float], parameter: str | Parameter | None = None
-) -> Chart:
-    """The chart of a parameter of a system over a range, checked; of the frequency for None."""
-    chosen = checked_parameter(system, FREQUENCY if parameter is None else parameter)
-    return Chart.of(chosen, limits)
+def chosen_parameter(system: System, parameter: str | Parameter | None = None) -> Parameter:
+    """A parameter of a system, checked; the frequency for None."""
+    return checked_parameter(system, FREQUENCY if parameter is None else parameter)
 
 
 @dataclass(frozen=True)
@@ -72,9 +69,9 @@ class Axis:
             If there is no such parameter, it cannot have these values, or the frequency is given
             where it changes or missing where it does not.
         """
-        chart = chart_over(system, limits, parameter)
-        name = parameter_name(chart.parameter)
-        if moves_frequency(chart.parameter):
+        chosen = chosen_parameter(system, parameter)
+        name = parameter_name(chosen)
+        if moves_frequency(chosen):
             if frequency_hz is not None:
                 raise SystemModelError(
                     f"frequency_hz is what parameter '{name}' changes: give it with another one"
@@ -85,7 +82,7 @@ class Axis:
             )
         else:
             check_frequency("frequency_hz", frequency_hz)
-        return cls(chart, frequency_hz)
+        return cls(Chart.of(chosen, limits), frequency_hz)
 
     @classmethod
     def in_frequency(cls, limits: tuple[float, float]) -> Axis:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from nldyn.base.errors import SystemModelError, check_frequency, check_range
-from nldyn.orbits.axis import Axis
 from nldyn.system.loads import Excitation
 from nldyn.system.parameters import Parameter
 from nldyn.system.round_stop import RoundStop
@@ -15,6 +14,7 @@ from nldyn.system.system import AnyDamper, AnySpring, System
 
 if TYPE_CHECKING:
     import cms
+    from nldyn.orbits.axis import Axis
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,8 @@ class LoadCase:
         SystemModelError
             If the system has no such parameter, or it cannot have these values.
         """
+        from nldyn.orbits.axis import Axis
+
         return Axis.of(system, self.limits, self.parameter, self.frequency_hz)
 
     def system(self, reduced: cms.ReducedModel) -> System:
