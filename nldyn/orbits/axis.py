@@ -136,8 +136,7 @@ class Axis:
 
     def spread(self, count: int) -> Real:
         """So many values from one end of the range to the other, equally far on its scale."""
-        spaced = np.geomspace if self.chart.logarithmic else np.linspace
-        return spaced(self.chart.low, self.chart.high, count)
+        return self.chart.spread(count)
 
     def middles(self, count: int) -> list[float]:
         """Middles of so many equal parts of the range, on its scale."""

@@ -11,7 +11,7 @@ import cms
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
 from nldyn.reduction.load_case import LoadCase
-from nldyn.system.chart import with_value
+from nldyn.system.chart import Chart, checked_parameter, with_value
 from nldyn.system.contact_law import duration_factor
 from nldyn.system.round_stop import RoundStop
 from nldyn.system.stop import Stop
@@ -160,8 +160,9 @@ def shortest_contact(setting: LoadCase, model: cms.ReducedModel) -> float:
     """
     systems = [setting.system(model)]
     if setting.parameter is not None:
-        axis = setting.axis(systems[0])
-        systems = [with_value(systems[0], axis.parameter, value) for value in axis.spread(3)]
+        chosen = checked_parameter(systems[0], setting.parameter)
+        values = Chart.of(chosen, setting.limits).spread(3)
+        systems = [with_value(systems[0], chosen, value) for value in values]
     return min(_shortest_in(system, setting.range_hz) for system in systems)
 
 

@@ -16,6 +16,7 @@ from nldyn.reduction.model_errors import (
     BRANCH_QUANTITIES,
     Errors,
     Measured,
+    axis_of,
     best_of,
     counted_modes,
     covers,
@@ -408,7 +409,7 @@ def convergence_study(
     if modes is None:
         wanted = [count for count in wanted if count >= known.fewest] or [max(wanted)]
     whole = known.whole
-    axis = setting.axis(setting.system(whole))
+    axis = axis_of(setting, setting.system(whole))
     at = axis.between(*axis.limits, 0.5) if at is None else at
     linear = measured_linear("", FULL if known.full else REFERENCE, whole, setting)
     counts = sorted(set(wanted))

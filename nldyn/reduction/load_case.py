@@ -14,7 +14,6 @@ from nldyn.system.system import AnyDamper, AnySpring, System
 
 if TYPE_CHECKING:
     import cms
-    from nldyn.orbits.axis import Axis
 
 
 @dataclass(frozen=True)
@@ -89,18 +88,6 @@ class LoadCase:
         """Lowest and highest excitation frequency in Hz, which are one where it is held."""
         hz = self.frequency_hz
         return self.limits if hz is None else (hz, hz)
-
-    def axis(self, system: System) -> Axis:
-        """What changes, of a system.
-
-        Raises
-        ------
-        SystemModelError
-            If the system has no such parameter, or it cannot have these values.
-        """
-        from nldyn.orbits.axis import Axis
-
-        return Axis.of(system, self.limits, self.parameter, self.frequency_hz)
 
     def system(self, reduced: cms.ReducedModel) -> System:
         """The system that a reduced model makes of it, the observed interface first.

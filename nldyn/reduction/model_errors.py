@@ -39,6 +39,17 @@ BRANCH_QUANTITIES = ("peak_at", "peak_height", "fold_flip")  # errors that need 
 VISIBLE = 1e-6  # of the largest displacement at an interface: that of a mode which is seen there
 
 
+def axis_of(setting: LoadCase, system: System) -> Axis:
+    """What changes in a load case, of a system.
+
+    Raises
+    ------
+    SystemModelError
+        If the system has no such parameter, or it cannot have these values.
+    """
+    return Axis.of(system, setting.limits, setting.parameter, setting.frequency_hz)
+
+
 @dataclass(frozen=True, eq=False)
 class Measured:
     """What one reduced model answers.
@@ -166,7 +177,7 @@ def measured(
     try:
         what = f"{linear.label}, {counted_modes(linear)}"
         system = setting.system(reduced)
-        axis = setting.axis(system)
+        axis = axis_of(setting, system)
         pieces, notes = harmonic_pieces(system, setting, at, told(progress, what, axis))
     except ConvergenceError as error:
         return replace(linear, note=str(error))
@@ -241,7 +252,7 @@ def with_orbit(
     progress(f"full model, {reduced.size} modes", guess.frequency_hz, 0.0)
     try:
         system = setting.system(reduced)
-        axis = setting.axis(system)
+        axis = axis_of(setting, system)
         orbit = transferred(guess, axis.at(FlowMap(system), axis.value(guess)).flow.system)
     except ConvergenceError as error:
         return replace(model, note=str(error))
@@ -327,7 +338,7 @@ def massless_receptance(
 
 def harmonic_branch(system: System, setting: LoadCase, tell: Callable[[float], None]) -> Branch:
     """The harmonic branch downwards from the upper end of the range."""
-    axis = setting.axis(system)
+    axis = axis_of(setting, system)
     _, high = axis.limits
     tell(high)
     try:
@@ -365,7 +376,7 @@ def harmonic_pieces(
     orbit.
     """
     pieces, notes = [harmonic_branch(system, setting, tell)], []
-    axis = setting.axis(system)
+    axis = axis_of(setting, system)
     low, _ = axis.limits
     reached, _ = pieces[0].span
 

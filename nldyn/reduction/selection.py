@@ -18,6 +18,7 @@ from nldyn.orbits.solve import solve_orbit
 from nldyn.reduction.candidates import BEYOND, Candidates, candidate_modes, share
 from nldyn.reduction.load_case import LoadCase
 from nldyn.reduction.model_errors import (
+    axis_of,
     harmonic_branch,
     largest_force,
     matched,
@@ -196,7 +197,7 @@ def select_modes(
     shares = Shares(progress or silent, {"reference": 3.0, "modes": 1.0})
     reference = cms.keep_modes(whole, seen)
     system = setting.system(reference)
-    tell = told(shares.part("reference"), "reference", setting.axis(system))
+    tell = told(shares.part("reference"), "reference", axis_of(setting, system))
     judge = Judge(setting, reference, harmonic_branch(system, setting, tell))
     candidates = visible.numbers
     shares.end("reference")
@@ -267,7 +268,7 @@ class Judge:
 
     def __init__(self, setting: LoadCase, reference: cms.ReducedModel, branch: Branch) -> None:
         self.setting, self.reference, self.branch = setting, reference, branch
-        self.axis = setting.axis(branch.points[0].system)
+        self.axis = axis_of(setting, branch.points[0].system)
         places = self.axis.spread(SAMPLES + 2)[1:-1]
         self.orbits: list[Orbit] = [o for place in places for o in branch.at(float(place))[:1]]
         self.orbits += [

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from nldyn.base.arrays import SLACK
+from nldyn.base.arrays import SLACK, Real
 from nldyn.base.errors import (
     LARGEST_FREQUENCY,
     SMALLEST_FREQUENCY,
@@ -474,6 +474,11 @@ class Chart:
                 f"the range of {name} must begin above zero, got {shown(limits)}"
             )
         return cls(parameter, float(low), float(high))
+
+    def spread(self, count: int) -> Real:
+        """So many values from one end of the range to the other, equally far on its scale."""
+        spaced = np.geomspace if self.logarithmic else np.linspace
+        return spaced(self.low, self.high, count)
 
     @property
     def range_name(self) -> str:
