@@ -15,7 +15,7 @@ from nldyn.longterm.attractors import Attractor, AttractorOptions
 from nldyn.longterm.basins import Basins, StatePlane, basins, check_has_basins, standard_error
 from nldyn.orbits.axis import Axis
 from nldyn.runtime.executors import check_execution
-from nldyn.runtime.progress import of_number, shows_progress
+from nldyn.runtime.progress import of_number, shows_progress, silent_count
 from nldyn.system.chart import parameter_name
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
@@ -162,7 +162,7 @@ def basins_over(
             basins(
                 here.flow, here.frequency_hz, plane, shape=shape, starts=starts, longest=longest,
                 checks=checks, seed=seed, observe=observe, options=options, executor=executor,
-                progress=_nobody,
+                progress=silent_count,
             )
         )  # fmt: skip
         if progress is not None:
@@ -184,7 +184,3 @@ def values_over(flow: FlowMap, axis: Axis, points: int) -> list[float]:
         here = axis.at(flow, value)
         check_has_basins(here.flow, here.frequency_hz)
     return list(values)
-
-
-def _nobody(done: int, total: int) -> None:
-    """Take what is done for nobody."""

@@ -28,7 +28,7 @@ from nldyn.orbits.history import History
 from nldyn.orbits.newton import check_bounded
 from nldyn.orbits.orbit import Orbit, check_observe, history_of
 from nldyn.runtime.executors import check_execution, values_of
-from nldyn.runtime.progress import of_number, shows_progress
+from nldyn.runtime.progress import of_number, shows_progress, silent_count
 from nldyn.system.system import System
 
 Counted = Callable[[int, int], None]  # told how many of how many are done
@@ -393,7 +393,7 @@ def simulate(
     if is_list(frequency_hz):
         task = partial(_simulated, flow, periods, transient)
         return values_of(task, cases, executor, progress)
-    return _simulated(flow, periods, transient, cases[0], progress or _nobody)
+    return _simulated(flow, periods, transient, cases[0], progress or silent_count)
 
 
 def is_list(value: object) -> bool:
@@ -428,12 +428,12 @@ def _starts(flow: FlowMap, start: Real | None, count: int) -> list[Real]:
     return [starting_state(flow, row) for row in modal]
 
 
-def _nobody(done: int, total: int) -> None:
-    """Take what is done for nobody."""
-
-
 def _simulated(
-    flow: FlowMap, periods: int, transient: int, case: tuple[float, Real], tell: Counted = _nobody
+    flow: FlowMap,
+    periods: int,
+    transient: int,
+    case: tuple[float, Real],
+    tell: Counted = silent_count,
 ) -> Motion:
     """The motion at a frequency in Hz from a state z at phase zero."""
     frequency_hz, state = case
@@ -631,7 +631,7 @@ def sweep(
     if several:
         task = partial(_swept, flow, float(rate_hz_per_s), steps_per_period)
         return values_of(task, cases, executor, progress)
-    return _swept(flow, float(rate_hz_per_s), steps_per_period, cases[0], progress or _nobody)
+    return _swept(flow, float(rate_hz_per_s), steps_per_period, cases[0], progress or silent_count)
 
 
 def _swept(
@@ -639,7 +639,7 @@ def _swept(
     rate: float,
     steps: int,
     case: tuple[tuple[float, float], Real],
-    tell: Counted = _nobody,
+    tell: Counted = silent_count,
 ) -> Motion:
     """The sweep over a range in Hz from a state z at phase zero."""
     (first, last), state = case

@@ -37,6 +37,10 @@ def silent(what: str, frequency_hz: float, done: float) -> None:
     """Tell nobody."""
 
 
+def silent_count(done: int, total: int) -> None:
+    """Tell nobody of what is counted."""
+
+
 class Shares:
     """A computation of parts, each with a weight in proportion to the time that it takes.
 
