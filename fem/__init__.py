@@ -1,6 +1,7 @@
 """Frames and structures: from a mesh to stiffness, mass and interfaces."""
 
 from fem.assembly.assemble import assemble
+from fem.assembly.contact import ContactPoints, contact_points
 from fem.assembly.frame import Component
 from fem.assembly.structure import DistortionWarning, LockingWarning, StructureComponent
 from fem.assembly.summary import MassProperties, mass_properties, summary
@@ -50,6 +51,7 @@ __all__ = [
     "Calibration",
     "CircularSection",
     "Component",
+    "ContactPoints",
     "Coupling",
     "CrossSection",
     "DistortionWarning",
@@ -87,6 +89,7 @@ __all__ = [
     "assemble",
     "box_mesh",
     "calibrate",
+    "contact_points",
     "frame_mesh",
     "from_meshio",
     "joined",

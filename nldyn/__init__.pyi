@@ -84,6 +84,7 @@ from nldyn.search.extend import extend_diagram as extend_diagram
 from nldyn.search.fixed_point_index import index_sum as index_sum
 
 # system: what is computed
+from nldyn.system.contact_area import contact_area as contact_area
 from nldyn.system.loads import BaseMotion as BaseMotion
 from nldyn.system.loads import ConstantForce as ConstantForce
 from nldyn.system.loads import HarmonicForce as HarmonicForce

@@ -56,6 +56,32 @@ class InertiaLoads:
         )
 
 
+    def with_interfaces(self, vectors: Mapping[str, FloatArray]) -> Self:
+        """The component with further interfaces, such as those of `contact_points`.
+
+        Parameters
+        ----------
+        vectors
+            Load vectors (N,) of unit forces, by name.
+
+        Raises
+        ------
+        ModelError
+            If a name is in use, or a vector has another length.
+        """
+        for name, vector in vectors.items():
+            if name in self.interfaces:
+                raise ModelError(f"there is an interface named '{name}' already")
+            if np.shape(vector) != (self.mass.shape[0],):
+                raise ModelError(
+                    f"interface '{name}' has shape {np.shape(vector)}, it must have "
+                    f"({self.mass.shape[0]},)"
+                )
+        return replace(  # type: ignore[type-var]  # of a dataclass
+            self, interfaces={**self.interfaces, **vectors}
+        )
+
+
 def inertia_load(
     inertia: FloatArray, names: Container[str], name: str, acceleration: Sequence[float]
 ) -> FloatArray:

@@ -39,6 +39,7 @@ from fem.elements.beams import (
     cross_matrix,
     element_matrices,
     element_rows,
+    hermite,
     local_axes,
     run,
     to_nodes,
@@ -62,6 +63,7 @@ from fem.elements.scatter import (
 from fem.elements.tapers import along
 from fem.mesh.attachments import PointMass
 from fem.mesh.pieces import check_joined
+from fem.model.parts import BeamPart
 from fem.model.store import load_structure, save_structure
 from fem.model.structure import AXES, StructureModel
 
@@ -427,12 +429,8 @@ def _beam_foundation(
             ends = model.mesh.points[lines[on]]
             what = f"{model.mesh.source}: part {name!r}"
             spans = ends[:, 1] - ends[:, 0]
-            axes = local_axes(part, spans, what)
-            spans = run(part, spans, what)
-            shapes = beam_shapes(np.linalg.norm(spans, axis=1))
-            # displacement of the axis in x, y, z: (e, q, 3, 12)
-            N = np.einsum("eji,eqjk,ekl->eqil", axes, shapes, to_nodes(part, axes), optimize=True)
-            weights = BEAM_WEIGHTS[None, :] * np.linalg.norm(spans, axis=1)[:, None]
+            lengths, N, _ = beam_motions(part, spans, what, BEAM_PLACES)
+            weights = BEAM_WEIGHTS[None, :] * lengths[:, None]
             K = np.einsum("eq,eqia,i,eqib->eab", weights, N, stiffness, N, optimize=True)
             yield K, beam_dofs(model, numbering, name)[on]
 
@@ -443,20 +441,41 @@ BEAM_PLACES, BEAM_WEIGHTS = (
 )
 
 
-def beam_shapes(lengths: FloatArray) -> FloatArray:
-    """Displacement (u, v, w) at Gauss's four places from the twelve local numbers, (e, 4, 3, 12).
+def beam_motions(
+    part: BeamPart, spans: FloatArray, what: str, places: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Lengths (e,) of beams, and translations and rotations of their axes, each (e, q, 3, 12).
+
+    At places (q,) from 0 to 1 along lines with spans (e, 3) between their nodes, by the
+    translations and rotations of these; in x, y and z.
+    """
+    axes = local_axes(part, spans, what)
+    lengths = np.linalg.norm(run(part, spans, what), axis=1)
+    ends = to_nodes(part, axes)
+    moves, turns = (
+        np.einsum("eji,eqjk,ekl->eqil", axes, shapes, ends, optimize=True)
+        for shapes in beam_shapes(lengths, places)
+    )
+    return lengths, moves, turns
+
+
+def beam_shapes(lengths: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Displacement (u, v, w) and rotation from the twelve local numbers, each (e, q, 3, 12).
 
     Hermite's cubics, also for Timoshenko beams, whose own differ by their shear strain.
     """
-    s = BEAM_PLACES
     N = np.zeros((len(lengths), len(s), 3, 12))
+    turns = np.zeros_like(N)
     N[:, :, 0, 0], N[:, :, 0, 6] = 1 - s, s
-    cubic = (1 - 3 * s**2 + 2 * s**3, s - 2 * s**2 + s**3, 3 * s**2 - 2 * s**3, s**3 - s**2)
+    turns[:, :, 0, 3], turns[:, :, 0, 9] = 1 - s, s
+    cubic, slopes = hermite(s)
     L = lengths[:, None]
     for row, dofs, sign in ((1, (1, 5, 7, 11), 1.0), (2, (2, 4, 8, 10), -1.0)):
-        N[:, :, row, dofs[0]], N[:, :, row, dofs[2]] = cubic[0], cubic[2]
-        N[:, :, row, dofs[1]], N[:, :, row, dofs[3]] = sign * L * cubic[1], sign * L * cubic[3]
-    return N
+        for k, dof in enumerate(dofs):
+            scale = sign * L if k % 2 else 1.0
+            N[:, :, row, dof] = scale * cubic[k]
+            turns[:, :, 3 - row, dof] = sign * scale * slopes[k] / L
+    return N, turns
 
 
 def _interface_vectors(

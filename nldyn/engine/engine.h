@@ -91,12 +91,14 @@ typedef struct {
     double sense;       /* 1 for a ring, in which the body is, -1 for a pin, around which it is */
     double rub;         /* coefficient of friction in the sense of sliding, from first to second */
     double surface;     /* speed in that sense of the surface on that of the other side */
+    double area;        /* number of the area of contact that it is a point of, or -1 */
+    double share;       /* what of that it stands for: change of its stiffness with the area's */
 } Stop;
 
 enum Column {
     GAP, STIFFNESS, EXPONENT, DISSIPATION, DASHPOT, MOBILITY, DURATION, INSTANT, RESTITUTION, BOND,
     DRAG, CUBIC, RELEASE, FRICTION, ADHESION, FADING, BELT, NORMAL, PRESSING,
-    SECOND, LEAD, CENTRE, SENSE, RUB, SURFACE, FIRST_POWER
+    SECOND, LEAD, CENTRE, SENSE, RUB, SURFACE, AREA, SHARE, FIRST_POWER
 };
 
 /* A system. Outputs are the penetrations of the stops, the displacements of sliders and bonds and
@@ -169,7 +171,8 @@ typedef struct {
      * ω and to each parameter */
     Complex *response;
     Complex *forced;           /* (1 + k, 2 + n_parameters, n_out) the same of the outputs */
-    const int64_t *parameters; /* (n_parameters, 2) column of `stops`, or -1; index of the stop */
+    /* (n_parameters, 2) column of `stops`, or -1; index of the stop, or -2 - number of an area */
+    const int64_t *parameters;
     double omega, tail, node_angle;
     Turn *turns; /* (2,) of the last phases that outputs were asked for at: mostly the same again */
     Watch *watch;

@@ -184,6 +184,23 @@ static bool depends_on_speed(const Flow *fl, int s)
     return !is_rigid(fl, s) && (fl->laws[s] != 0 || lossy);
 }
 
+/* whether column c of the parameters is a number of a stop or slider, or of the area that it belongs
+ * to */
+static bool is_number_of(const Flow *fl, int c, int s)
+{
+    int64_t column = fl->parameters[2 * c], index = fl->parameters[2 * c + 1];
+    if (index >= -1) return index == s;
+    return (int64_t)stop_of(fl, s)->area == -2 - index && is_slider(fl, s) == (column == FRICTION);
+}
+
+/* change of a stop's number in a column with column c of the parameters, which is that number of
+ * the stop or of its area */
+static double share_in(const Flow *fl, int c, int s)
+{
+    bool of_area = fl->parameters[2 * c + 1] <= -2 && fl->parameters[2 * c] == STIFFNESS;
+    return of_area ? stop_of(fl, s)->share : 1.0;
+}
+
 /* whether it does, or is to be differentiated by what makes it do so */
 static bool needs_speed(const Flow *fl, int s)
 {
@@ -192,7 +209,7 @@ static bool needs_speed(const Flow *fl, int s)
     for (int c = 0; c < fl->n_parameters; c++) {
         int64_t column = fl->parameters[2 * c];
         bool viscous = column == DISSIPATION || column == DASHPOT;
-        needed = needed || (viscous && fl->parameters[2 * c + 1] == s);
+        needed = needed || (viscous && is_number_of(fl, c, s));
     }
     return needed;
 }

@@ -44,6 +44,8 @@ class StopRow(NamedTuple):
     sense: float = 1.0  # 1 for a ring, in which the body is, -1 for a pin, around which it is
     rub: float = 0.0  # coefficient of friction in the sense of sliding, from first to second
     surface: float = 0.0  # speed in that sense of the surface on that of the other side
+    area: float = -1.0  # number of the area of contact that it is a point of, or -1
+    share: float = 1.0  # what of that it stands for: change of its stiffness with the area's
 
 
 FIRST_POWER = len(

@@ -108,7 +108,7 @@ static void add_node_columns(const Flow *fl, double node_phase, double t, const 
     }
     for (int c = 0; c < fl->n_parameters && order == 0; c++) {
         int64_t column = fl->parameters[2 * c];
-        if (fl->parameters[2 * c + 1] != stop || column < GAP) continue;
+        if (!is_number_of(fl, c, stop) || column < GAP) continue;
         if (is_slider(fl, stop)) { /* what is held does not go with its friction */
             double way = friction_at(fl, stop, panel->output[(na + o) * m + i]).value;
             if (column == PRESSING) forces[fl->size + c] += way;
@@ -117,7 +117,8 @@ static void add_node_columns(const Flow *fl, double node_phase, double t, const 
             continue;
         }
         double speed = panel->outputs > na ? panel->output[(na + o) * m + i] : 0.0;
-        forces[fl->size + c] += law_by(fl, stop, column, panel->output[o * m + i], speed);
+        forces[fl->size + c] +=
+            share_in(fl, c, stop) * law_by(fl, stop, column, panel->output[o * m + i], speed);
     }
 }
 

@@ -120,7 +120,7 @@ static void leave_parting(const Motion *M, double phase, bool *still)
 /* whether column c of the parameters is a stop's own number */
 static bool is_parameter(const Flow *fl, int c, int64_t column, int stop)
 {
-    return fl->parameters[2 * c] == column && fl->parameters[2 * c + 1] == stop;
+    return fl->parameters[2 * c] == column && is_number_of(fl, c, stop);
 }
 
 /* fill `shift` (n_columns,): change of the instant at which a gap closes */

@@ -50,7 +50,14 @@ from nldyn.engine.newton import Corrector, Found, newton, packed_record, packed_
 from nldyn.engine.sample import local_extremes, sample_states
 from nldyn.flow.gauss import GaussTables, gauss_tables
 from nldyn.flow.options import FlowOptions, _floats, _nodes_for_switch
-from nldyn.flow.packing import bond_row, parameter_tables, second_row, slider_row, stop_row
+from nldyn.flow.packing import (
+    bond_row,
+    of_areas,
+    parameter_tables,
+    second_row,
+    slider_row,
+    stop_row,
+)
 from nldyn.system.contact_law import law_address
 from nldyn.system.linear import ForcedResponse
 from nldyn.system.parameters import Parameter
@@ -372,6 +379,7 @@ class FlowMap:
             slider_row(slider, float(v @ v), self.options)
             for slider, v in zip(s.sliders, vectors[len(s.stops) :], strict=False)
         ]
+        stops = of_areas(s, stops)
         first_bond = len(stops)
         stops += [
             bond_row(bond, float(v @ v))

@@ -16,6 +16,7 @@ from nldyn.flow.options import FlowOptions
 from nldyn.system.contact_law import duration_factor
 from nldyn.system.friction import Slider
 from nldyn.system.parameters import (
+    OF_AREAS,
     OF_ROUND,
     OF_SLIDERS,
     OF_SPRINGS,
@@ -81,6 +82,17 @@ def second_row(stop: RoundStop, lead: int, mobility: float, options: FlowOptions
     )
 
 
+def of_areas(system: System, rows: Sequence[StopRow]) -> list[StopRow]:
+    """Rows of stops and sliders with the areas of contact that they belong to."""
+    area = {i: float(number) for number, of in enumerate(system.areas.values()) for i in of}
+    places = [*range(len(system.stops)), *(slider.stop for slider in system.sliders)]
+    shares = [getattr(stop, "share", 1.0) for stop in system.stops]
+    return [
+        row._replace(area=area[place], share=shares[place]) if place in area else row
+        for row, place in zip(rows, places, strict=True)
+    ]
+
+
 def bond_row(bond: Bond, mobility: float) -> StopRow:
     """Numbers of a bond as the engine takes them, but for the coefficients of its powers."""
     return _NO_STOP._replace(mobility=mobility, bond=1.0, drag=bond.drag, cubic=bond.cubic)
@@ -119,7 +131,9 @@ def parameter_tables(
     for row, parameter in enumerate(parameters):
         check_exact(system, parameter)
         name, index = parameter.name, parameter.index
-        if name in _COLUMNS:
+        if name in OF_AREAS:
+            table[row] = StopRow._fields.index(OF_AREAS[name]), -2 - index
+        elif name in _COLUMNS:
             table[row] = _COLUMNS[name], index
         elif name in OF_ROUND:
             before = len(system.stops) + len(system.sliders) + len(system.bonds)

@@ -183,9 +183,7 @@ def _numbers_of(condition: Condition) -> dict[str, Any]:
     return {name: getattr(condition, name) for name in names}
 
 
-def _read_curve(
-    group: Group, laws: Laws, monitor: OwnMonitor | None
-) -> Curve | Branch | Backbone:
+def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve | Branch | Backbone:
     family, kind = _read_family(group, laws), group.text("kind")
     reasons = group.texts("stop_reasons")
     nodes = _read_points(group, family, kind, monitor)

@@ -81,6 +81,8 @@ def write_flow(group: Any, flow: FlowMap) -> None:
     _write_basis(group, system)
     _write_rigid_stops(group, system)
     _write_elastic_stops(group, [stop for stop in system.stops if isinstance(stop, Stop)])
+    if system.areas:
+        set_attribute(group, "areas", json.dumps(_told_areas(system)))
     if system.round_stops:
         set_attribute(group, "round_stops", json.dumps(_told_round(system)))
     viscous = [d for d in system.dampers if not isinstance(d, DryFriction)]
@@ -118,6 +120,32 @@ def _told_friction(system: System) -> dict[str, Any]:
             if isinstance(damper, DryFriction) and isinstance(damper.friction, Friction)
         },
     }
+
+
+def _told_areas(system: System) -> dict[str, list[list[float]]]:
+    """The areas of contact: places of their points among all stops, and shares."""
+    return {
+        name: [
+            [place, stop.share] for place, stop in zip(places, system.area_stops(name), strict=True)
+        ]
+        for name, places in system.areas.items()
+    }
+
+
+def _with_areas(group: Group, stops: tuple[AnyStop, ...]) -> tuple[AnyStop, ...]:
+    """Stops with what `_told_areas` told."""
+    if not group.has_attribute("areas"):
+        return stops
+    found = list(stops)
+    try:
+        for name, points in json.loads(group.text("areas")).items():
+            for place, share in points:
+                point = found[int(place)]
+                assert isinstance(point, Stop)
+                found[int(place)] = replace(point, area=name, share=share)
+    except (ValueError, TypeError, AttributeError, IndexError, AssertionError):
+        raise group.fault("attribute", "areas", "does not tell areas of contact") from None
+    return tuple(found)
 
 
 def _told_round(system: System) -> dict[int, dict[str, Any]]:
@@ -405,7 +433,7 @@ def _read_stops(group: Group, laws: Laws) -> tuple[AnyStop, ...]:
     own = {i: law for i, law in laws.items() if i not in other}
     elastic = _read_elastic_stops(group.group("stops"), own, set(other))
     stops: dict[int, AnyStop] = {**other, **elastic}
-    return tuple(stops[i] for i in sorted(stops))
+    return _with_areas(group, tuple(stops[i] for i in sorted(stops)))
 
 
 def _read_elastic_stops(group: Group, laws: Laws, taken: set[int]) -> dict[int, Stop]:

@@ -20,6 +20,7 @@ from nldyn.base.errors import (
 from nldyn.system.friction import DryFriction
 from nldyn.system.naming import turned
 from nldyn.system.parameters import (
+    OF_AREAS,
     OF_ROUND,
     OF_SLIDERS,
     OF_SPRINGS,
@@ -42,7 +43,7 @@ _OF_DAMPERS = ("coefficient",)
 _OF_SPRINGS = {"spring_stiffness": "stiffness"}  # and what it is called there
 _OF_MODES = ("modal_damping", "natural_frequency_hz")
 OF_ELEMENTS = (
-    *(*_OF_STOPS, *OF_ROUND, *SOURCES, *OF_SLIDERS),
+    *(*_OF_STOPS, *OF_AREAS, *OF_ROUND, *SOURCES, *OF_SLIDERS),
     *(*_OF_DAMPERS, *_OF_SPRINGS, *OF_SPRINGS),
 )
 UNITS = {
@@ -55,6 +56,9 @@ UNITS = {
     "dissipation": "s/m",
     "dashpot": "N s/m",
     "restitution": "1",
+    "area_gap": "m",
+    "area_stiffness": "N/m^exponent per m² or m",
+    "area_friction": "1",
     "clearance": "m",
     "rubbing_friction": "1",
     "first_eccentricity": "m",
@@ -73,7 +77,14 @@ BOUNDS = {
     name: (0.0, math.inf)
     for name in (
         *("stiffness", "dissipation", "dashpot", *SOURCES, *OF_SLIDERS),
-        *("clearance", "rubbing_friction", *_OF_DAMPERS, *_OF_MODES),
+        *(
+            "area_stiffness",
+            "area_friction",
+            "clearance",
+            "rubbing_friction",
+            *_OF_DAMPERS,
+            *_OF_MODES,
+        ),
     )
     if name != "force"  # has either sign
 } | {  # between which there are systems
@@ -83,6 +94,7 @@ BOUNDS = {
 POSITIVE = (
     "clearance",
     "stiffness",
+    "area_stiffness",
     "normal_force",
     "natural_frequency_hz",
 )  # there is no system where they are zero
@@ -143,7 +155,7 @@ class OwnParameter(Parameter):
 
 def has_exact_derivatives(parameter: Parameter) -> bool:
     """Whether the flow map differentiates by the parameter itself."""
-    return parameter.name in (*_OF_STOPS, *SOURCES, *OF_SLIDERS, *OF_SPRINGS)
+    return parameter.name in (*_OF_STOPS, *OF_AREAS, *SOURCES, *OF_SLIDERS, *OF_SPRINGS)
 
 
 def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
@@ -156,7 +168,8 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     parameter : str or Parameter
         An `OwnParameter`, or frequency_hz; gap, stiffness, exponent, dissipation, dashpot or
         restitution of a stop; amplitude, mass_times_radius or force of an excitation; friction or
-        normal_force of a slider; coefficient of a damper; spring_stiffness of a linear spring; k1,
+        normal_force of a slider; area_gap, area_stiffness or area_friction of an area of contact;
+        coefficient of a damper; spring_stiffness of a linear spring; k1,
         k2, ... of a polynomial one;
         modal_damping (ratio) or natural_frequency_hz of a mode; spin_hz of a system with a `Spin`,
         or speed_hz, which is spin and frequency in one where they are equal. The index -1 of
@@ -301,6 +314,13 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
         return float(system.frequencies_hz[index])
     if name in OF_SPRINGS:
         return float(_polynomial(system, index).coefficients[int(name[1:]) - 1])
+    if name in OF_AREAS:
+        points = system.area_stops(index)
+        if name == "area_friction":
+            return points[0].law_of_friction.coefficient
+        if name == "area_gap":
+            return min(stop.gap for stop in points)
+        return points[0].stiffness / points[0].share
     if name == "friction":
         return system.sliders[index].friction.coefficient
     if name in OF_ROUND:
@@ -312,6 +332,8 @@ def elements_of(system: System, name: str) -> Sequence[Any]:
     """The elements of a system of which a parameter of some name is a number."""
     if name in OF_SLIDERS:
         return system.sliders
+    if name in OF_AREAS:
+        return [system.stops[places[0]] for places in system.areas.values()]
     if name in SOURCES:
         return system.excitation
     if name in _OF_DAMPERS:
@@ -341,6 +363,8 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
         return system.with_spin(value)
     if name in _OF_STOPS:
         return system.with_elements(stops=_replaced(system.stops, index, name, value))
+    if name in OF_AREAS:
+        return system.with_area(index, OF_AREAS[name], value)
     if name in OF_ROUND:
         other = system.round_stops[index].with_number(name, value)
         stops = (*system.stops[:index], other, *system.stops[index + 1 :])

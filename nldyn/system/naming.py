@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from nldyn.system.round_stop import RoundStop
+from nldyn.system.stop import Stop
 
 if TYPE_CHECKING:
     from nldyn.system.system import System
@@ -56,6 +57,9 @@ def stop_name(system: System, index: int) -> str:
     stops, stop = system.stops, system.stops[index]
     if isinstance(stop, RoundStop):
         return _round_name(system, stop)
+    if isinstance(stop, Stop) and stop.area is not None:
+        points = system.areas[stop.area]
+        return f"'{stop.area}', point {points.index(index) + 1} of {len(points)}"
     name = f"stop at '{stop.at}'" + (f" against '{stop.against}'" if stop.against else "")
     alike = [other for other in stops if (other.at, other.against) == (stop.at, stop.against)]
     if any(other.direction != stop.direction for other in alike):

@@ -16,6 +16,11 @@ OF_ROUND = ("clearance", "rubbing_friction", "first_eccentricity", "second_eccen
 SHARED = ("stiffness", "exponent", "dissipation")
 OF_SPRINGS = tuple(f"k{power}" for power in range(1, LARGEST_DEGREE + 1))
 OF_SLIDERS = {"friction": "coefficient", "normal_force": "normal_force"}  # and what it is there
+OF_AREAS = {  # and which number of their stops it is
+    "area_gap": "gap",
+    "area_stiffness": "stiffness",
+    "area_friction": "friction",
+}
 SOURCES = ("amplitude", "mass_times_radius", "force")
 
 
@@ -43,10 +48,11 @@ class Parameter:
         law of its own, but for the gap); clearance, rubbing_friction (the coefficient),
         first_eccentricity or second_eccentricity of a round clearance; amplitude,
         mass_times_radius or force of an excitation; k1, k2, ..., the coefficients of a polynomial
-        spring; friction (the coefficient) and normal_force of a slider.
+        spring; friction (the coefficient) and normal_force of a slider; area_gap (the smallest),
+        area_stiffness (per m² or m) and area_friction of an area of contact.
     index : int
-        Which of the stops, excitations, springs, sliders (`System.sliders`), dampers or modes of
-        the system.
+        Which of the stops, excitations, springs, sliders (`System.sliders`), areas
+        (`System.areas`), dampers or modes of the system.
 
     Raises
     ------
@@ -95,6 +101,16 @@ def check_exact(system: System, parameter: Parameter) -> None:
             raise SystemModelError(
                 f"parameter '{name}': stops[{index}] has a law of its own, which knows no {name}"
             )
+    elif name in OF_AREAS:
+        check_index(parameter, "area of contact", len(system.areas))
+        points = system.area_stops(index)
+        if name == "area_friction" and points[0].friction is None:
+            raise SystemModelError(f"parameter '{name}': area '{points[0].area}' has no friction")
+        if name == "area_stiffness" and any(stop.law is not None for stop in points):
+            raise SystemModelError(
+                f"parameter '{name}': area '{points[0].area}' has a law of its own, which knows no "
+                "stiffness"
+            )
     elif name in OF_ROUND:
         check_index(parameter, "stop", len(system.stops))
         if index not in system.round_stops:
@@ -123,7 +139,7 @@ def check_exact(system: System, parameter: Parameter) -> None:
                 f"parameter '{name}': a stop presses slider {index} on, no constant force"
             )
     else:
-        known = ", ".join([*OF_STOPS, *OF_ROUND, *SOURCES, *OF_SPRINGS, *OF_SLIDERS])
+        known = ", ".join([*OF_STOPS, *OF_AREAS, *OF_ROUND, *SOURCES, *OF_SPRINGS, *OF_SLIDERS])
         raise SystemModelError(f"unknown parameter '{name}'; there are: {known}")
 
 

@@ -262,6 +262,10 @@ class Stop:
         sliding along `tangent`; where that rests, it sticks as long as friction can hold it.
     tangent_against : str, optional
         The same interface of what is on the other side; the ground unless given.
+    area : str, optional
+        Name of the area of contact that it is a point of, see `contact_area`.
+    share : float
+        What of that area it stands for: its weight in m² or m, or 1 node by node.
 
     Raises
     ------
@@ -287,6 +291,8 @@ class Stop:
     tangent: str | None = None
     friction: Friction | float | None = None
     tangent_against: str | None = None
+    area: str | None = None
+    share: float = 1.0
     impulsive: ClassVar[bool] = False  # whether velocities jump where it is hit
 
     def __post_init__(self) -> None:
@@ -315,6 +321,8 @@ class Stop:
             )
         check_finite(owner, "gap", self.gap)
         check_sides(owner, self.at, self.against, self.direction)
+        check_types(**{f"{owner}: area": (self.area, str, None)})
+        check_positive(owner, "share", self.share)
         self._check_friction(owner)
 
     def _check_friction(self, owner: str) -> None:
@@ -332,6 +340,11 @@ class Stop:
                 "own, and a dashpot only with pulls = False"
             )
         object.__setattr__(self, "friction", as_friction(owner, self.friction))
+
+    @property
+    def law_of_friction(self) -> Friction:
+        """The law of its friction; one that has none has a coefficient of zero."""
+        return self.friction if isinstance(self.friction, Friction) else Friction(0.0)
 
     @property
     def is_linear(self) -> bool:

@@ -525,6 +525,37 @@ class System:
         return {i: s for i, s in enumerate(self.stops) if isinstance(s, Stop | RoundStop)}
 
     @cached_property
+    def areas(self) -> dict[str, tuple[int, ...]]:
+        """The areas of contact by name, each with the places of its points among all stops."""
+        found: dict[str, list[int]] = {}
+        for place, stop in enumerate(self.stops):
+            if isinstance(stop, Stop) and stop.area is not None:
+                found.setdefault(stop.area, []).append(place)
+        return {name: tuple(places) for name, places in found.items()}
+
+    def area_stops(self, area: int | str) -> list[Stop]:
+        """The stops of an area of contact, by its name or number."""
+        places = self.areas[area] if isinstance(area, str) else list(self.areas.values())[area]
+        return [stop for place in places if isinstance(stop := self.stops[place], Stop)]
+
+    def with_area(self, number: int, name: str, value: float) -> System:
+        """The system with another `gap`, `stiffness` or `friction` of an area of contact.
+
+        The gaps of all its points are moved alike, the smallest one to the value.
+        """
+        stops = list(self.stops)
+        points = self.area_stops(number)
+        moved = value - min(stop.gap for stop in points)
+        for place, stop in zip(list(self.areas.values())[number], points, strict=True):
+            change: dict[str, Any] = {
+                "gap": {"gap": stop.gap + moved},
+                "stiffness": {"stiffness": value * stop.share},
+                "friction": {"friction": stop.law_of_friction.with_coefficient(value)},
+            }[name]
+            stops[place] = replace(stop, **change)
+        return self.with_elements(stops=stops)
+
+    @cached_property
     def round_stops(self) -> dict[int, RoundStop]:
         """The round clearances, by their places among all stops."""
         return {i: stop for i, stop in enumerate(self.stops) if isinstance(stop, RoundStop)}
