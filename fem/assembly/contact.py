@@ -163,7 +163,8 @@ def unit_vector(at: str, direction: str | Sequence[float]) -> FloatArray:
     if isinstance(direction, str):
         name = direction.removeprefix("-")
         if name in AXES:
-            return np.eye(3)[AXES.index(name)] * (-1.0 if direction.startswith("-") else 1.0)
+            sign = -1.0 if direction.startswith("-") else 1.0
+            return np.asarray(sign * np.eye(3)[AXES.index(name)], dtype=np.float64)
         vector = np.zeros(0)
     else:
         vector = np.asarray(direction, dtype=np.float64)
@@ -173,7 +174,7 @@ def unit_vector(at: str, direction: str | Sequence[float]) -> FloatArray:
             f"contact at {at!r}: direction must be 'x', 'y', 'z', one of these with '-', or a "
             f"vector, not {direction!r}"
         )
-    return vector / length
+    return np.asarray(vector / length, dtype=np.float64)
 
 
 def _gathered(
@@ -236,7 +237,7 @@ def _frame_blocks(component: Component, at: str, points: int, arm: FloatArray) -
     model, mesh = component.model, component.model.mesh
     inside = np.zeros(len(mesh.points), dtype=np.bool_)
     inside[_nodes_at(component, at)] = True
-    chosen = inside[mesh.lines].all(axis=1)
+    chosen = np.asarray(inside[mesh.lines].all(axis=1))
     if at in mesh.parts:
         chosen[:] = False
         chosen[mesh.part(at)] = True

@@ -547,12 +547,12 @@ class System:
         points = self.area_stops(number)
         moved = value - min(stop.gap for stop in points)
         for place, stop in zip(list(self.areas.values())[number], points, strict=True):
-            change: dict[str, Any] = {
-                "gap": {"gap": stop.gap + moved},
-                "stiffness": {"stiffness": value * stop.share},
-                "friction": {"friction": stop.law_of_friction.with_coefficient(value)},
-            }[name]
-            stops[place] = replace(stop, **change)
+            values: dict[str, Any] = {
+                "gap": stop.gap + moved,
+                "stiffness": value * stop.share,
+                "friction": stop.law_of_friction.with_coefficient(value),
+            }
+            stops[place] = replace(stop, **{name: values[name]})
         return self.with_elements(stops=stops)
 
     @cached_property
