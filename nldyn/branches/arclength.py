@@ -440,15 +440,19 @@ class Stepper:
         return None
 
     def _scaled_to_rest(self, here: BranchNode, behind: Real) -> list[BranchNode] | None:
-        """What ends the walk where orbits shrink in proportion to parameters whose ranges end at 0.
+        """What ends the walk where orbits shrink in proportion to parameters that go to zero.
 
         They would do so for ever on the scale of their own size. It is rest, but where no orbit of
         a curve is found there; None if they do not.
         """
         family, charts, n = here.family, here.family.charts, here.family.n_states
-        lows = [low for low, _ in self._ranges]
-        at_zero = [place for place, chart in enumerate(charts) if 0.0 == chart.low == lows[place]]
-        if not (at_zero and len(behind)) or here.tangent[n + at_zero[-1]] >= 0.0:
+        at_zero = [
+            place
+            for place, (chart, limits) in enumerate(zip(charts, self._ranges, strict=True))
+            if (chart.low, chart.high) == limits and chart.low <= 0.0 <= chart.high
+            and here.tangent[n + place] * np.sign(here.point[n + place]) < -SCALES
+        ]  # fmt: skip
+        if not (at_zero and len(behind)):
             return None
         scaled = np.arange(here.point.size) < n
         scaled[[n + place for place in at_zero]] = True

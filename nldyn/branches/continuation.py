@@ -31,14 +31,13 @@ from nldyn.branches.endings import Ending, StopReason, StopReasons
 from nldyn.branches.leg import Leg, LegBuilder, Progress
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
-from nldyn.orbits.axis import chosen_parameter
 from nldyn.orbits.bordered import FREE, OrbitFamily, Place, correct
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
 from nldyn.runtime.prefetch import Ahead
 from nldyn.runtime.progress import of_value, shows_progress
 from nldyn.runtime.threads import one_thread
-from nldyn.system.chart import Chart, told_value, value_of
+from nldyn.system.chart import Chart, checked_parameter, told_value, value_of
 from nldyn.system.parameters import Parameter
 
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
@@ -173,7 +172,7 @@ def family_over(
     SystemModelError
         If the range is empty or does not hold the orbit, or there is no such parameter.
     """
-    chart = Chart.of(chosen_parameter(orbit.system, parameter), limits)
+    chart = Chart.of(checked_parameter(orbit.system, parameter), limits)
     value = value_of(orbit.system, orbit.frequency_hz, chart.parameter)
     slack = SLACK * max(abs(chart.low), abs(chart.high))
     if not chart.low - slack <= value <= chart.high + slack:

@@ -33,11 +33,6 @@ from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
 
-def chosen_parameter(system: System, parameter: str | Parameter | None = None) -> Parameter:
-    """A parameter of a system, checked; the frequency for None."""
-    return checked_parameter(system, FREQUENCY if parameter is None else parameter)
-
-
 @dataclass(frozen=True)
 class Axis:
     """A parameter over a range, and the excitation frequency where that is another number.
@@ -69,7 +64,7 @@ class Axis:
             If there is no such parameter, it cannot have these values, or the frequency is given
             where it changes or missing where it does not.
         """
-        chosen = chosen_parameter(system, parameter)
+        chosen = checked_parameter(system, parameter)
         name = parameter_name(chosen)
         if moves_frequency(chosen):
             if frequency_hz is not None:

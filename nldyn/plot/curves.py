@@ -12,7 +12,7 @@ from nldyn.bifurcations.kinds import kind_of
 from nldyn.curves.curves import Curve
 from nldyn.plot.diagram import PERIOD_COLOURS, new_axes
 from nldyn.plot.words import unit_in
-from nldyn.system.chart import unit_of
+from nldyn.system.chart import unit_within
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
@@ -96,7 +96,7 @@ def plot_curves(curves: Sequence[Curve], ax: Axes | None = None) -> Axes:
 
 def _scale_and_label(parameter: Parameter, largest: float, system: System) -> tuple[float, str]:
     """Factor from SI to the unit drawn, and the label of an axis."""
-    title, unit = TITLES.get(parameter.name, parameter.name), unit_of(parameter, system)
+    title, unit = TITLES.get(parameter.name, parameter.name), unit_within(system, parameter)
     if parameter.name == "gap":
         factor, unit = unit_in(unit, largest)
         return 1.0 / factor, f"{title} ({unit})"

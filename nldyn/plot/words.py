@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from nldyn.base.errors import check_choice
 from nldyn.orbits.history import told
-from nldyn.system.chart import FREQUENCY, parameter_name, unit_of, words_of
+from nldyn.system.chart import FREQUENCY, parameter_name, unit_of, unit_within, words_of
 from nldyn.system.naming import is_angle, moment_unit
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
@@ -49,7 +49,7 @@ class Along:
     @classmethod
     def of(cls, parameter: Parameter, largest: float, system: System | None = None) -> Along:
         """For values up to a largest one; of a system, whose stops may act on rotations."""
-        unit = unit_of(parameter, system)
+        unit = unit_of(parameter) if system is None else unit_within(system, parameter)
         if unit in PREFIXED:
             return cls(parameter, *axis_unit(largest, PREFIXED[unit]))
         return cls(parameter, 1.0, "" if unit == "1" else unit)

@@ -158,14 +158,14 @@ def has_exact_derivatives(parameter: Parameter) -> bool:
     return parameter.name in (*_OF_STOPS, *OF_AREAS, *SOURCES, *OF_SLIDERS, *OF_SPRINGS)
 
 
-def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
-    """A parameter, of which a name alone means index 0.
+def checked_parameter(system: System, parameter: str | Parameter | None) -> Parameter:
+    """A parameter, of which a name alone means index 0; the frequency for None.
 
     Parameters
     ----------
     system : System
         The system that must have it.
-    parameter : str or Parameter
+    parameter : str or Parameter, optional
         An `OwnParameter`, or frequency_hz; gap, stiffness, exponent, dissipation, dashpot or
         restitution of a stop; amplitude, mass_times_radius or force of an excitation; friction or
         normal_force of a slider; area_gap, area_stiffness or area_friction of an area of contact;
@@ -180,6 +180,8 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     SystemModelError
         If there is no such number.
     """
+    if parameter is None:
+        return THE_FREQUENCY
     if isinstance(parameter, OwnParameter):
         _own_value(system, parameter)
         return parameter
@@ -248,12 +250,15 @@ def label_of(parameter: Parameter) -> str:
     return words if unit == "1" else f"{words} ({unit})"
 
 
-def unit_of(parameter: Parameter, system: System | None = None) -> str:
-    """Unit of a parameter, 1 if it has none; of a system, whose elements may act on rotations."""
-    if isinstance(parameter, OwnParameter):
-        return parameter.unit
-    unit = UNITS[parameter.name]
-    if system is None or parameter.name not in OF_ELEMENTS:
+def unit_of(parameter: Parameter) -> str:
+    """Unit of a parameter, 1 if it has none."""
+    return parameter.unit if isinstance(parameter, OwnParameter) else UNITS[parameter.name]
+
+
+def unit_within(system: System, parameter: Parameter) -> str:
+    """Unit of a parameter of a system, whose elements may act on rotations."""
+    unit = unit_of(parameter)
+    if parameter.name not in OF_ELEMENTS:
         return unit
     at = elements_of(system, parameter.name)[parameter.index].at
     return turned(unit) if system.unit(at) == "rad" else unit

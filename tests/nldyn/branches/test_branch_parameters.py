@@ -8,9 +8,14 @@ from scipy.optimize import brentq
 
 import nldyn
 from nldyn import (
+    ConstantForce,
     ContinuationOptions,
+    Damper,
     HarmonicForce,
+    PolynomialSpring,
     RigidStop,
+    RoundStop,
+    Spring,
     Stop,
     System,
     SystemModelError,
@@ -20,8 +25,9 @@ from nldyn import (
     switch_branch,
 )
 from nldyn.branches.endings import Ending
-from nldyn.system.chart import with_value
+from nldyn.system.chart import OwnParameter, with_value
 from nldyn.system.parameters import Parameter
+from nldyn.system.spin import Spin
 
 HZ = 20.0
 RANGES = {  # inner and outer
@@ -53,6 +59,57 @@ def whole(request):
                            parameter=request.param)  # fmt: skip
 
 
+def duffing() -> System:
+    return System.from_matrices(
+        [[1.0]], [[0.8]], {"m": [1.0]}, damping=[[0.1]], dampers=[Damper("m", 0.02)],
+        springs=[PolynomialSpring("m", [0.1, 0.0, 0.5]), Spring("m", 0.1)],
+        stops=[Stop("m", 20.0, 1.5, gap=0.8, dissipation=0.1)],
+        excitation=[HarmonicForce("m", 0.3), ConstantForce("m", 0.1)],
+    )  # fmt: skip
+
+
+def whirl(*stops: Stop | RoundStop) -> System:
+    return System.from_matrices(
+        np.eye(2), np.diag([1.0, 1.2]), {"x": [1.0, 0.0], "y": [0.0, 1.0]},
+        damping=0.2 * np.eye(2), spin=Spin(0.2, gyroscopic=[[0.0, 0.1], [-0.1, 0.0]]),
+        stops=stops,
+        excitation=[HarmonicForce("x", 0.4), HarmonicForce("y", 0.4, phase_deg=-90.0)],
+    )  # fmt: skip
+
+
+def rotor() -> System:
+    return whirl(Stop("x", 50.0, gap=0.5))
+
+
+def rotor_in_a_ring() -> System:
+    return whirl(RoundStop(("x", "y"), 50.0, 0.5, friction=0.1, surface_speed=1.0))
+
+
+WEIGHT = OwnParameter(
+    name="weight over spring",
+    value=lambda system: system.excitation[1].force / 0.8,
+    changed=lambda system, ratio: with_value(system, Parameter("force", 1), 0.8 * ratio),
+)
+IN_EVERY = {  # the system and a frequency, the parameter and its range
+    (beam, HZ): [("stiffness", (1e9, 2e10)), ("gap", (-5e-5, 1e-5))],
+    (rigid, 0.4): [("restitution", (0.4, 0.95)), ("amplitude", (0.5, 2.0))],
+    (duffing, 0.2): [
+        ("amplitude", (0.1, 1.0)),
+        (Parameter("force", 1), (-0.3, 0.5)),
+        ("coefficient", (0.0, 0.1)),
+        ("k3", (0.0, 2.0)),
+        (Parameter("spring_stiffness", 1), (-0.1, 0.4)),
+        ("exponent", (1.0, 2.5)),
+        ("dissipation", (0.0, 1.0)),
+        ("natural_frequency_hz", (0.1, 0.2)),
+        (WEIGHT, (0.0, 0.4)),
+    ],
+    (rotor, 0.21): [("spin_hz", (-0.2, 0.6))],
+    (rotor_in_a_ring, 0.21): [("clearance", (0.3, 1.0)), ("rubbing_friction", (0.0, 0.3))],
+}
+ROWS = [(*begin, *row) for begin, rows in IN_EVERY.items() for row in rows]
+
+
 def check_same(a, b):
     for x, y in zip(a.nodes, b.nodes, strict=True):
         assert np.array_equal(x.point, y.point)
@@ -76,6 +133,16 @@ def test_a_branch_that_goes_on_is_one_that_was_never_interrupted(whole, tmp_path
     check_same(continue_branch(begun, options=ContinuationOptions()), whole)
     part = saved(continue_branch(orbit, inner, parameter=name), tmp_path / "part.h5")
     check_same(continue_branch(part, outer), whole)
+
+
+@pytest.mark.parametrize(("make", "hz", "parameter", "limits"), ROWS)
+def test_a_branch_goes_on_to_the_last_bit_in_every_parameter(make, hz, parameter, limits):
+    few, more = ContinuationOptions(max_points=4), ContinuationOptions(max_points=12)
+    orbit = solve_orbit(make(), hz)
+    whole = continue_branch(orbit, limits, parameter=parameter, options=more)
+    begun = continue_branch(orbit, limits, parameter=parameter, options=few)
+    assert len(begun.nodes) < len(whole.nodes)
+    check_same(continue_branch(begun, options=more), whole)
 
 
 def test_special_points_are_those_of_a_branch_in_the_frequency(whole):

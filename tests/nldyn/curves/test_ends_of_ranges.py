@@ -3,7 +3,17 @@
 import numpy as np
 import pytest
 
-from nldyn import HarmonicForce, RigidStop, Stop, System, continue_branch, find_orbits, solve_orbit
+from nldyn import (
+    ConstantForce,
+    HarmonicForce,
+    RigidStop,
+    Stop,
+    System,
+    Unbalance,
+    continue_branch,
+    find_orbits,
+    solve_orbit,
+)
 from nldyn.branches.endings import Ending
 
 
@@ -43,6 +53,35 @@ def test_orbits_that_shrink_in_proportion_end_at_rest(stops):
     unit = sizes[-1] / forces[-1]
     np.testing.assert_allclose(sizes, unit * forces, rtol=1e-8)
     assert [forces[0], sizes[0]] == [0.0, 0.0]
+
+
+def pushed(force):
+    """A linear system under a constant force, and what is shaken as well."""
+    return System.from_matrices(
+        [[2.0, 0.3], [0.3, 1.0]], [[3.0, -1.0], [-1.0, 1.0]], {"x": [1.0, 0.0], "y": [0.0, 1.0]},
+        damping=0.1 * np.eye(2), excitation=[force],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("force", "name", "limits"),
+    [
+        (HarmonicForce("y", 1.0), "amplitude", (0.0, 2.0)),
+        (Unbalance("x", 0.5), "mass_times_radius", (0.0, 2.0)),
+        (ConstantForce("y", 0.4), "force", (0.0, 2.0)),
+        (ConstantForce("y", 0.4), "force", (-1.0, 2.0)),
+        (ConstantForce("y", -0.4), "force", (-1.0, 2.0)),
+    ],
+)
+def test_a_linear_system_is_followed_to_rest_in_whatever_drives_it(force, name, limits):
+    curve = continue_branch(solve_orbit(pushed(force), 0.13), limits, parameter=name)
+    at_rest = curve.stop_reasons.index("the orbits shrink in proportion to "
+                                       f"{name}, to rest where it is zero")  # fmt: skip
+    assert len(curve.points) < 50
+    assert not (curve.special_points or curve.notes)
+    assert curve.values[-at_rest] == 0.0
+    assert curve.points[-at_rest].max_abs_displacement == 0.0
+    assert endings(curve)[1 - at_rest] is Ending.PARAMETER_RANGE_END
 
 
 def test_a_range_is_crossed_where_an_impact_stays_long_beside_a_phase_of_shooting():
