@@ -6,6 +6,7 @@ from cms.checks.checks import Checks, check, mac
 from cms.checks.coupled_accuracy import CoupledAccuracy, coupled_accuracy
 from cms.component.component import ComponentLike, Matrices
 from cms.files.matrix_files import ReadMatrices, read_matrices
+from cms.reduction.area import Area, Attached
 from cms.reduction.coupling import Joint, couple
 from cms.reduction.model import ReducedModel
 from cms.reduction.reduction import METHODS, keep_modes, reduce
@@ -15,6 +16,8 @@ __version__ = "1.0.0"
 __all__ = [
     "METHODS",
     "Accuracy",
+    "Area",
+    "Attached",
     "Checks",
     "ComponentLike",
     "CoupledAccuracy",

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cms.base.arrays import FloatArray
 from cms.base.errors import ReductionError
+from cms.reduction.area import Attached
 
 FORMAT = "cms.ReducedModel"
 FORMAT_VERSION = 2
@@ -65,6 +66,8 @@ class ReducedModel:
     left_out_hz : tuple of float
         Frequencies in Hz of modes below the last kept one that are left out, as no interface sees
         them.
+    areas : dict of str to Attached
+        How many attachment modes areas of contact were given, and their static errors.
     rigid_bound_hz : float
         Up to where the few digits of given matrices leave the frequency of rigid-body modes
         undetermined; those below are zero. 0 for matrices in double precision.
@@ -93,6 +96,7 @@ class ReducedModel:
     rigid_bound_hz: float = 0.0
     load_vectors: tuple[str, ...] = ()
     left_out_hz: tuple[float, ...] = ()
+    areas: Mapping[str, Attached] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check the shapes and make the arrays read-only."""
@@ -378,6 +382,9 @@ class ReducedModel:
             "left_out_hz": np.array(self.left_out_hz),
             "components": np.array(list(self.components), dtype=np.str_),
             "component_rows": np.array(list(self.components.values()), dtype=np.int64),
+            "areas": np.array(list(self.areas), dtype=np.str_),
+            "attachment_modes": np.array([a.modes for a in self.areas.values()], dtype=np.int64),
+            "static_errors": np.array([a.static_error for a in self.areas.values()]),
         }
         for name in OPTIONAL:
             if getattr(self, name) is not None:
@@ -469,6 +476,13 @@ def later_fields(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
         "rigid_bound_hz": float(arrays.get("rigid_bound_hz", 0.0)),
         "load_vectors": tuple(str(name) for name in arrays.get("load_vectors", ())),
         "left_out_hz": tuple(float(hz) for hz in arrays.get("left_out_hz", ())),
+        "areas": {
+            str(name): Attached(int(modes), float(error))
+            for name, modes, error in zip(
+                *(arrays.get(key, ()) for key in ("areas", "attachment_modes", "static_errors")),
+                strict=True,
+            )
+        },
         **{name: arrays[name] for name in OPTIONAL if name in arrays},
     }
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,6 +22,7 @@ from cms.component.component import (
     symmetric_matrix,
     times,
 )
+from cms.reduction.area import Area
 from cms.reduction.condensed import condensed
 from cms.reduction.constraint import fixed_interface, fixed_interface_errors
 from cms.reduction.doubt import check_doubtful_digits
@@ -67,6 +70,7 @@ def reduce(
     method: str = "rubin",
     residual: bool = True,
     unseen: bool = False,
+    areas: Mapping[str, Area] = MappingProxyType({}),
     progress: Progress | None = None,
 ) -> ReducedModel:
     r"""Reduce a component by component mode synthesis.
@@ -101,6 +105,10 @@ def reduce(
         Whether modes that no interface sees are kept and counted, too: for matrices beside these
         that couple modes, as a gyroscopic one. The component's own ``damping`` is looked at: where
         it couples the modes left out with the others, all are kept.
+    areas : mapping of str to Area
+        Interfaces that are points of areas of contact: they share as few attachment modes as the
+        static deflection needs, told in the model's ``areas``. For "rubin" and "craig-chang"; by
+        fixed-interface methods each point has its own.
     progress : callable, optional
         Called as ``progress(text)`` with what is to be done, how much memory it needs, and which
         solver does it.
@@ -165,7 +173,7 @@ def reduce(
     with announced(progress), one_thread():
         check_doubtful_digits(component, pencil)
         try:
-            by_method = reduced_fixed if method in FIXED else reduced_free
+            by_method = reduced_fixed if method in FIXED else partial(reduced_free, areas=areas)
             reduced, left_out = by_method(pencil, modes, cutoff_hz, method, unseen)
             if couples(getattr(component, "damping", None), reduced.basis, left_out):
                 reduced, _ = by_method(pencil, modes, cutoff_hz, method, True)
@@ -223,7 +231,12 @@ def chosen_method(method: str, residual: bool) -> str:
 
 
 def reduced_free(
-    pencil: Pencil, modes: int | None, cutoff_hz: float | None, method: str, unseen: bool
+    pencil: Pencil,
+    modes: int | None,
+    cutoff_hz: float | None,
+    method: str,
+    unseen: bool,
+    areas: Mapping[str, Area],
 ) -> tuple[ReducedModel, FloatArray]:
     """Free-interface modes with what the method adds to them, and the modes left out (N, k)."""
     shifted = shifted_factor(pencil)
@@ -231,12 +244,17 @@ def reduced_free(
     if method != "truncation":
         check_rigid_kept(modes, shifted)
     kept, left_out = kept_modes(pencil, shifted, modes, cutoff_hz, unseen, pencil.loads)
-    model = with_residuals(pencil, shifted, kept, cutoff_hz, method)
+    model = with_residuals(pencil, shifted, kept, cutoff_hz, method, areas)
     return replace(model, left_out_hz=in_hz(left_out)), left_out.vectors
 
 
 def with_residuals(
-    pencil: Pencil, shifted: Shifted, kept: Modes, cutoff_hz: float | None, method: str
+    pencil: Pencil,
+    shifted: Shifted,
+    kept: Modes,
+    cutoff_hz: float | None,
+    method: str,
+    areas: Mapping[str, Area],
 ) -> ReducedModel:
     """The model of the kept modes and what a free-interface method adds to them."""
     if method == "truncation":
@@ -255,12 +273,12 @@ def with_residuals(
             residual_flexibility=(flexibility + flexibility.T) / 2,
             residual_shapes=shapes,
         )
-    extra = residual_modes(pencil, shifted, kept.vectors)
+    extra = residual_modes(pencil, shifted, kept.vectors, areas)
     if kept.squares.size + extra.squares.size == 0:
         raise ReductionError(nothing_kept(cutoff_hz))
     errors = mode_errors(pencil, shifted, extra.squares, extra.vectors)
     added = Modes(extra.squares, extra.vectors, errors)
-    whole = assembled(pencil, kept, extra.dropped, method, added)
+    whole = replace(assembled(pencil, kept, extra.dropped, method, added), areas=extra.attached)
     if not extra.massless.shape[1]:
         return whole
     direct = extra.massless.T @ pencil.loads

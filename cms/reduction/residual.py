@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 from scipy import linalg
@@ -10,6 +12,7 @@ from scipy import linalg
 from cms.base.arrays import FloatArray
 from cms.component.component import Pencil, times
 from cms.component.massless import MASSLESS
+from cms.reduction.area import Area, Attached, gathered
 from cms.reduction.inertia import elastic_solutions, quotient
 from cms.solvers.eigen import Shifted
 
@@ -31,12 +34,15 @@ class ResidualModes:
         all modes with mass are kept.
     dropped : int
         How many of the interfaces' residuals vanish or depend on the others.
+    attached : dict of str to Attached
+        What each area of contact was given.
     """
 
     squares: FloatArray
     vectors: FloatArray
     massless: FloatArray
     dropped: int
+    attached: Mapping[str, Attached] = field(default_factory=dict)
 
 
 def residual_flexibility(pencil: Pencil, shifted: Shifted, modes: FloatArray) -> FloatArray:
@@ -55,7 +61,12 @@ def without_modes(vectors: FloatArray, modes: FloatArray, pencil: Pencil) -> Flo
     return vectors
 
 
-def residual_modes(pencil: Pencil, shifted: Shifted, modes: FloatArray) -> ResidualModes:
+def residual_modes(
+    pencil: Pencil,
+    shifted: Shifted,
+    modes: FloatArray,
+    areas: Mapping[str, Area] = MappingProxyType({}),
+) -> ResidualModes:
     """Residual flexibility modes of all interfaces, projected on K and M and diagonalised.
 
     Parameters
@@ -66,6 +77,8 @@ def residual_modes(pencil: Pencil, shifted: Shifted, modes: FloatArray) -> Resid
         The factorised K, or K + s M where the component floats.
     modes : (N, k) array
         The kept, mass-normalised modes, with all rigid-body modes among them.
+    areas : mapping of str to Area
+        Interfaces that share a few.
 
     Returns
     -------
@@ -78,14 +91,19 @@ def residual_modes(pencil: Pencil, shifted: Shifted, modes: FloatArray) -> Resid
     energy matrix reveal the rank; those below 1e-12 (a change of at most 1e-12 in the static
     flexibility) are dropped.
     """
-    static = elastic_solutions(pencil, shifted, pencil.loads)
-    size = np.sqrt(np.maximum(np.sum(pencil.loads * static, axis=0), 0.0))
+    static, loads = elastic_solutions(pencil, shifted, pencil.loads), pencil.loads
+    attached: dict[str, Attached] = {}
+    if areas:
+        left = without_modes(static, modes, pencil)
+        chosen, attached = gathered(areas, pencil.names, loads, left)
+        static, loads = static @ chosen, loads @ chosen
+    size = np.sqrt(np.maximum(np.sum(loads * static, axis=0), 0.0))
     static = static * quotient(np.ones_like(size), size)
     residual = without_modes(static, modes, pencil)
     basis = independent_part(residual, pencil, pencil.size - modes.shape[1])
     basis = without_modes(basis, modes, pencil)
     squares, vectors, massless = diagonalised(basis, pencil, shifted.fastest)
-    return ResidualModes(squares, vectors, massless, pencil.loads.shape[1] - basis.shape[1])
+    return ResidualModes(squares, vectors, massless, loads.shape[1] - basis.shape[1], attached)
 
 
 def independent_part(residual: FloatArray, pencil: Pencil, at_most: int) -> FloatArray:
