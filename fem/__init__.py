@@ -1,7 +1,7 @@
 """Frames and structures: from a mesh to stiffness, mass and interfaces."""
 
 from fem.assembly.assemble import assemble
-from fem.assembly.contact import ContactPoints, contact_points
+from fem.assembly.contact import ContactPoints, contact_points, opposite_points, unit_vector
 from fem.assembly.frame import Component
 from fem.assembly.structure import DistortionWarning, LockingWarning, StructureComponent
 from fem.assembly.summary import MassProperties, mass_properties, summary
@@ -97,6 +97,7 @@ __all__ = [
     "mass_properties",
     "node_at",
     "nodes_inside",
+    "opposite_points",
     "parts_of",
     "pieces_of",
     "read_abaqus",
@@ -107,5 +108,6 @@ __all__ = [
     "structure_mesh",
     "summary",
     "symmetry",
+    "unit_vector",
     "write_mesh",
 ]

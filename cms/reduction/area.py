@@ -40,13 +40,13 @@ class Area:
     Examples
     --------
     >>> Area(("left", "right"), [1e5, 1e5]).tolerance
-    0.001
+    0.01
     """
 
     points: Sequence[str]
     stiffness: Sequence[float] | FloatArray
     modes: int | None = None
-    tolerance: float = 1e-3
+    tolerance: float = 1e-2
 
     def __post_init__(self) -> None:
         stiffness = np.asarray(self.stiffness, dtype=np.float64)

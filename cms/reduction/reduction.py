@@ -7,7 +7,6 @@ import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from types import MappingProxyType
 
 import numpy as np
 
@@ -70,7 +69,7 @@ def reduce(
     method: str = "rubin",
     residual: bool = True,
     unseen: bool = False,
-    areas: Mapping[str, Area] = MappingProxyType({}),
+    areas: Mapping[str, Area] | None = None,
     progress: Progress | None = None,
 ) -> ReducedModel:
     r"""Reduce a component by component mode synthesis.
@@ -107,8 +106,8 @@ def reduce(
         it couples the modes left out with the others, all are kept.
     areas : mapping of str to Area
         Interfaces that are points of areas of contact: they share as few attachment modes as the
-        static deflection needs, told in the model's ``areas``. For "rubin" and "craig-chang"; by
-        fixed-interface methods each point has its own.
+        static deflection needs, told in the model's ``areas``; the component's own ``areas`` unless
+        given. For "rubin" and "craig-chang"; by fixed-interface methods each point has its own.
     progress : callable, optional
         Called as ``progress(text)`` with what is to be done, how much memory it needs, and which
         solver does it.
@@ -168,12 +167,13 @@ def reduce(
     check_request(modes, cutoff_hz)
     pencil = checked_pencil(component)
     check_count(modes, method, pencil)
+    shared = getattr(component, "areas", {}) if areas is None else areas
     if method in FIXED and not pencil.names:
         raise ReductionError(f"method '{method}' needs an interface, and the component has none")
     with announced(progress), one_thread():
         check_doubtful_digits(component, pencil)
         try:
-            by_method = reduced_fixed if method in FIXED else partial(reduced_free, areas=areas)
+            by_method = reduced_fixed if method in FIXED else partial(reduced_free, areas=shared)
             reduced, left_out = by_method(pencil, modes, cutoff_hz, method, unseen)
             if couples(getattr(component, "damping", None), reduced.basis, left_out):
                 reduced, _ = by_method(pencil, modes, cutoff_hz, method, True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -21,6 +21,7 @@ from fem.model.parts import BeamPart
 
 AXES = ("x", "y", "z")
 FLAT = 1e-4  # 1 - cosine of the angle between the normals of what counts as flat
+OPPOSITE = 1e-6  # of the length of a line, or of the mesh: how far off a point may lie
 HELD = 1e-12  # motion of a point, of one that is free: a support holds it
 MOST_PLACES = 12  # in one direction of a cell
 
@@ -214,8 +215,11 @@ def _gathered(
 
 
 def _node_block(component: Component | StructureComponent, at: str) -> list[Block]:
+    return _blocks_of_nodes(component, _nodes_at(component, at))
+
+
+def _blocks_of_nodes(component: Component | StructureComponent, nodes: IntArray) -> list[Block]:
     mesh = component.model.mesh
-    nodes = _nodes_at(component, at)
     if isinstance(component, Component):
         dofs = np.stack([3 * nodes, 3 * nodes + 1, np.full_like(nodes, -1)], axis=1)
     else:
@@ -234,6 +238,22 @@ def _nodes_at(component: Component | StructureComponent, at: str) -> IntArray:
 
 def _frame_blocks(component: Component, at: str, points: int, arm: FloatArray) -> list[Block]:
     """Lines of plane beams; their surface lies off the axis by an arm (3,)."""
+    lines = _frame_lines(component, at)
+    s, weights = gauss(points)
+    lengths = component.model.mesh.lengths[lines]
+    return [
+        _on_lines(
+            component,
+            np.repeat(lines, points),
+            np.tile(s, len(lines)),
+            np.outer(lengths, weights).ravel(),
+            arm,
+        )
+    ]
+
+
+def _frame_lines(component: Component, at: str) -> IntArray:
+    """The lines of beams of a part, or all of whose nodes are in a set."""
     model, mesh = component.model, component.model.mesh
     inside = np.zeros(len(mesh.points), dtype=np.bool_)
     inside[_nodes_at(component, at)] = True
@@ -247,33 +267,118 @@ def _frame_blocks(component: Component, at: str, points: int, arm: FloatArray) -
     lines = np.flatnonzero(chosen)
     if not len(lines):
         raise ModelError(f"{mesh.source}: contact at {at!r}: no beam has all its nodes in it")
-    s, weights = gauss(points)
+    return lines
+
+
+def _on_lines(
+    component: Component, lines: IntArray, s: FloatArray, weights: FloatArray, arm: FloatArray
+) -> Block:
+    """One place s (k,) from 0 to 1 on each of some lines (k,) of a frame, an arm off the axis."""
+    mesh = component.model.mesh
     ends, lengths = mesh.points[mesh.lines[lines]], mesh.lengths[lines]
     along = (ends[:, 1] - ends[:, 0]) / lengths[:, None]
-    across = np.stack([-along[:, 1], along[:, 0], np.zeros(len(lines))], axis=1)
     cubic, slopes = hermite(s)
-    shapes = np.zeros((len(lines), len(s), 3, 6))
-    scale = np.ones((4, len(lines)))
-    scale[1::2] = lengths
-    turn = np.cross([0.0, 0.0, 1.0], arm)  # displacement by a unit rotation
-    axes = {0: (1.0 - s, 0), 3: (s, 0)}
-    local = np.zeros((len(lines), len(s), 3, 6))  # along, across, rotation
-    for dof, (values, row) in axes.items():
-        local[:, :, row, dof] = values
+    local = np.zeros((len(lines), 3, 6))  # along, across, rotation
+    local[:, 0, 0], local[:, 0, 3] = 1.0 - s, s
     for k, dof in enumerate((1, 2, 4, 5)):
-        local[:, :, 1, dof] = scale[k][:, None] * cubic[k]
-        local[:, :, 2, dof] = scale[k][:, None] * slopes[k] / lengths[:, None]
-    moved = np.einsum("ei,eqa->eqia", along, local[:, :, 0])
-    moved += np.einsum("ei,eqa->eqia", across, local[:, :, 1])
-    moved += np.einsum("i,eqa->eqia", turn, local[:, :, 2])
+        scale = lengths if k % 2 else np.ones(len(lines))
+        local[:, 1, dof], local[:, 2, dof] = scale * cubic[k], scale * slopes[k] / lengths
+    axes = np.zeros((len(lines), 3, 3))  # of these three, and what a rotation moves
+    axes[:, :, 0] = along
+    axes[:, 0, 1], axes[:, 1, 1] = -along[:, 1], along[:, 0]
+    axes[:, :, 2] = np.cross([0.0, 0.0, 1.0], arm)
     to_local = np.zeros((len(lines), 6, 6))
     for first in (0, 3):
         to_local[:, first, first : first + 2] = along[:, :2]
-        to_local[:, first + 1, first : first + 2] = across[:, :2]
+        to_local[:, first + 1, first : first + 2] = axes[:, :2, 1]
         to_local[:, first + 2, first + 2] = 1.0
-    shapes = np.einsum("eqia,eab->eqib", moved, to_local)
-    places = (1.0 - s)[:, None] * ends[:, None, 0] + s[:, None] * ends[:, None, 1]
-    return [(places + arm, weights * lengths[:, None], shapes, component.element_dofs[lines])]
+    shapes = axes @ local @ to_local
+    places = ends[:, 0] + s[:, None] * (ends[:, 1] - ends[:, 0]) + arm
+    return places[:, None], weights[:, None], shapes[:, None], component.element_dofs[lines]
+
+
+def opposite_points(
+    component: Component | StructureComponent,
+    points: ContactPoints,
+    at: str,
+    *,
+    surface: float = 0.0,
+) -> ContactPoints:
+    """The points of another set of a component that lie opposite to those of an area.
+
+    Parameters
+    ----------
+    component
+        What was assembled.
+    points
+        Those of the area.
+    at
+        The other set: of a plane frame, beams, on which the points are found along the normal; of
+        a structure, nodes that lie opposite to nodes.
+    surface
+        Distance in m, against the normal, of the surface from the axis of the other beams.
+
+    Returns
+    -------
+    ContactPoints
+        In the order of the first ones, with their weights and the same direction.
+
+    Raises
+    ------
+    ModelError
+        If there is no such set, or nothing of it lies opposite to a point.
+
+    Examples
+    --------
+    >>> import fem
+    >>> places = {"a": (0, 0), "b": (2, 0), "c": (0, 0.1), "d": (3, 0.1)}
+    >>> mesh = fem.frame_mesh(places, [("low", "a", "b", 4), ("high", "c", "d", 5)])
+    >>> beam = fem.BeamPart(fem.Material(2e11, 7800.0), fem.Section(1e-3, 1e-8))
+    >>> pair = fem.assemble(fem.FrameModel(
+    ...     mesh,
+    ...     parts={"low": beam, "high": beam},
+    ...     supports=[fem.Support(end, ("x", "y", "rotation")) for end in ("a", "c")],
+    ...     separate=True,
+    ... ))
+    >>> low = fem.contact_points(pair, "low", "y", points=1)
+    >>> high = fem.opposite_points(pair, low, "high")
+    >>> bool(abs(high.places[:, 0] - low.places[:, 0]).max() < 1e-15)
+    True
+    """
+    mesh, normal = component.model.mesh, points.direction
+    if isinstance(component, Component) and points.measure != "node":
+        lines = _frame_lines(component, at)
+        ends = mesh.points[mesh.lines[lines]]
+        flat = np.eye(3) - np.outer(normal, normal)
+        start, span = ends[:, 0] @ flat, (ends[:, 1] - ends[:, 0]) @ flat
+        away = points.places[:, None] @ flat - start
+        length = np.maximum((span**2).sum(axis=1), np.finfo(float).tiny)
+        s = np.clip((away * span).sum(axis=2) / length, 0.0, 1.0)
+        off = np.linalg.norm(away - s[:, :, None] * span, axis=2)
+        nearest = off.argmin(axis=1)
+        rows = np.arange(len(nearest))
+        found, size = off[rows, nearest], float(np.sqrt(length.max()))
+        blocks = [
+            _on_lines(
+                component, lines[nearest], s[rows, nearest], points.weights, -surface * normal
+            )
+        ]
+    else:
+        nodes = _nodes_at(component, at)
+        across = mesh.points[nodes] - np.outer(mesh.points[nodes] @ normal, normal)
+        here = points.places - np.outer(points.places @ normal, normal)
+        far = np.linalg.norm(here[:, None] - across, axis=2)
+        nearest, size = far.argmin(axis=1), float(np.ptp(mesh.points, axis=0).max())
+        found = far.min(axis=1)
+        blocks = _blocks_of_nodes(component, nodes[nearest])
+    if found.max() > OPPOSITE * size:
+        place = ", ".join(f"{x:g}" for x in points.places[int(found.argmax())])
+        raise ModelError(
+            f"{mesh.source}: contact of {points.at!r} against {at!r}: nothing of that lies "
+            f"opposite to the point at ({place})"
+        )
+    places, _, motion = _gathered(component, blocks)
+    return replace(points, at=at, places=places, motion=motion)
 
 
 def _structure_blocks(

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -64,6 +65,8 @@ class Component(InertiaLoads):
         Matrix in N s/m of the dampers that the file of the mesh holds; None without any.
     load_vectors
         Names of those interfaces that are load vectors, see `with_load`.
+    areas
+        Interfaces that are the points of areas of contact, see `with_interfaces`.
     """
 
     stiffness: SparseArray
@@ -76,6 +79,7 @@ class Component(InertiaLoads):
     inertia: FloatArray
     damping: SparseArray | None = None
     load_vectors: tuple[str, ...] = ()
+    areas: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
     def natural_form(self) -> NaturalForm:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
-from typing import Self
+from types import MappingProxyType
+from typing import Any, Self
 
 import numpy as np
 
@@ -21,6 +22,7 @@ class InertiaLoads:
     inertia: FloatArray
     rigid_mass: FloatArray
     load_vectors: tuple[str, ...]
+    areas: Mapping[str, Any]
 
     def __repr__(self) -> str:
         """One line: how large and how heavy it is, and where it can be held or hit."""
@@ -55,14 +57,18 @@ class InertiaLoads:
             load_vectors=(*self.load_vectors, name),
         )
 
-
-    def with_interfaces(self, vectors: Mapping[str, FloatArray]) -> Self:
+    def with_interfaces(
+        self, vectors: Mapping[str, FloatArray], areas: Mapping[str, Any] = MappingProxyType({})
+    ) -> Self:
         """The component with further interfaces, such as those of `contact_points`.
 
         Parameters
         ----------
         vectors
             Load vectors (N,) of unit forces, by name.
+        areas
+            Which of them are points of areas of contact, as `cms.Area`; a reduction gives these
+            few attachment modes.
 
         Raises
         ------
@@ -78,7 +84,9 @@ class InertiaLoads:
                     f"({self.mass.shape[0]},)"
                 )
         return replace(  # type: ignore[type-var]  # of a dataclass
-            self, interfaces={**self.interfaces, **vectors}
+            self,
+            interfaces={**self.interfaces, **vectors},
+            areas={**self.areas, **areas},
         )
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -111,6 +112,8 @@ class StructureComponent(InertiaLoads):
         Matrix in N s/m of the dampers that the file of the mesh holds; None without any.
     load_vectors
         Names of those interfaces that are load vectors, see `with_load`.
+    areas
+        Interfaces that are the points of areas of contact, see `with_interfaces`.
     """
 
     stiffness: SparseArray
@@ -123,6 +126,7 @@ class StructureComponent(InertiaLoads):
     inertia: FloatArray
     damping: SparseArray | None = None
     load_vectors: tuple[str, ...] = ()
+    areas: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def free(self) -> IntArray:

@@ -49,7 +49,7 @@ def describe_system(system: System, residual: int = 0) -> str:
     """
     import numpy as np
 
-    names = list(system.interfaces)
+    names = told_interfaces(system)
     width = max(14, *(len(name) + 2 for name in names))
     lines = ["mode   frequency (Hz)   participation (1/sqrt(kg)) at"]
     lines.append(" " * 23 + "".join(f"{name:>{width}}" for name in names))
@@ -62,9 +62,9 @@ def describe_system(system: System, residual: int = 0) -> str:
     if system.rotations:
         turning = ", ".join(repr(name) for name in names if name in system.rotations)
         lines.append(f"of the rotation of {turning}: rad for m, N m for N")
-    lines += [describe_stop(stop, system.unit(stop.at)) for stop in system.stops]
+    lines += describe_stops(system)
     lines += [describe_spring(spring, system.unit(spring.at)) for spring in system.springs]
-    lines += [describe_slider(slider, system.unit(slider.at)) for slider in system.sliders]
+    lines += describe_sliders(system)
     if np.any(system.spring_stiffness):
         hz = ", ".join(f"{value:.6f}" for value in system.linear.frequencies_hz)
         lines.append(f"frequencies with the springs: {hz} Hz")
@@ -105,9 +105,43 @@ def _short(stop: AnyStop) -> str:
 
 def _places(system: System, q: Real) -> str:
     return ", ".join(
-        f"{float(phi @ q):.6g} {system.unit(name)} at '{name}'"
-        for name, phi in system.participation.items()
+        f"{float(system.participation[name] @ q):.6g} {system.unit(name)} at '{name}'"
+        for name in told_interfaces(system)
     )
+
+
+def told_interfaces(system: System) -> list[str]:
+    """The interfaces, without the points of areas of contact."""
+    points = {
+        end
+        for name in system.areas
+        for stop in system.area_stops(name)
+        for end in (stop.at, stop.against, stop.tangent, stop.tangent_against)
+    }
+    return [name for name in system.interfaces if name not in points]
+
+
+def describe_stops(system: System) -> list[str]:
+    """A line for each stop, and one for each area of contact."""
+    single = [
+        describe_stop(stop, system.unit(stop.at))
+        for stop in system.stops
+        if getattr(stop, "area", None) is None
+    ]
+    return single + [describe_area(system, name) for name in system.areas]
+
+
+def describe_area(system: System, name: str) -> str:
+    """Say in a line how many points an area has, and what they do."""
+    stops = system.area_stops(name)
+    first, gaps = stops[0], sorted({stop.gap for stop in stops})
+    unit = "N/m" + ("" if first.exponent == 1.0 else f"^{first.exponent:g}")
+    total = sum(stop.stiffness for stop in stops)
+    told = f"contact area '{name}': {len(stops)} points, {total:.6g} {unit} in all, "
+    told += f"gap {gaps[0]:g} m" if len(gaps) == 1 else f"gaps {gaps[0]:g} to {gaps[-1]:g} m"
+    told += f", dissipation {first.dissipation:g} s/m" if first.dissipation else ""
+    told += f", friction {first.law_of_friction.coefficient:g}" if first.friction else ""
+    return told
 
 
 def describe_stop(stop: AnyStop, length: str = "m") -> str:
@@ -161,6 +195,16 @@ def describe_spring(spring: AnySpring, length: str = "m") -> str:
     return f"spring {where}: {', '.join(terms) or f'0 {unit}'}"
 
 
+def describe_sliders(system: System) -> list[str]:
+    """A line for each slider, but those of areas of contact."""
+    of_areas = {place for places in system.areas.values() for place in places}
+    return [
+        describe_slider(slider, system.unit(slider.at))
+        for slider in system.sliders
+        if slider.stop not in of_areas
+    ]
+
+
 def describe_slider(slider: Slider, length: str = "m") -> str:
     """Say in a line where something slides, and what presses it on; of a rotation in rad."""
     from nldyn.system.naming import moment_unit
@@ -197,13 +241,13 @@ def static_flexibility(system: System, interface: str) -> float:
 def described_as_json(system: System) -> dict[str, object]:
     """Static flexibilities and stops of a system."""
     flexibilities: dict[str, dict[str, float]] = {}
-    for name in system.interfaces:
+    for name in told_interfaces(system):
         key = f"static_flexibility_{'rad_per_n_m' if name in system.rotations else 'm_per_n'}"
         flexibilities.setdefault(key, {})[name] = static_flexibility(system, name)
     return {
         **flexibilities,
-        "stops": [describe_stop(stop, system.unit(stop.at)) for stop in system.stops],
-        "friction": [describe_slider(slider, system.unit(slider.at)) for slider in system.sliders],
+        "stops": describe_stops(system),
+        "friction": describe_sliders(system),
     }
 
 

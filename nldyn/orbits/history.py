@@ -113,11 +113,15 @@ class History:
         """A Dataset over ``time``, ``interface``, ``stop`` and ``mode`` (needs xarray)."""
         data = {
             "displacement": (
-                ("time", "interface"), self.displacements, {"units": told(self.units.values())}
+                ("time", "interface"),
+                self.displacements,
+                {"units": told(self.units.values())},
             ),
             "penetration": (("time", "stop"), self.penetration, {"units": told(self.stop_units)}),
             "force": (
-                ("time", "stop"), self.force, {"units": told(map(moment_unit, self.stop_units))}
+                ("time", "stop"),
+                self.force,
+                {"units": told(map(moment_unit, self.stop_units))},
             ),
             "modal": (("time", "mode"), self.modal, {"units": "m kg^0.5"}),
             "modal_velocity": (("time", "mode"), self.modal_velocity, {"units": "m kg^0.5/s"}),

@@ -67,10 +67,14 @@ def not_drawn(scene: Scene) -> list[str]:
         for index, stop in enumerate(scene.stops)
         if (why := why_not_drawn(scene, index))
     ]
-    return flat + [
-        f"round clearance at '{table.plane[0]}' and '{table.plane[1]}', which is all around"
-        for table in scene.round_clearances
-    ]
+    return (
+        flat
+        + [
+            f"round clearance at '{table.plane[0]}' and '{table.plane[1]}', which is all around"
+            for table in scene.round_clearances
+        ]
+        + [f"contact area '{table.called}', which is many points" for table in scene.contact_areas]
+    )
 
 
 def with_stops_not_drawn(title: str, scene: Scene) -> str:

@@ -35,6 +35,10 @@ def undamped(scene: Scene) -> Scene:
         "damping": DampingTable(),
         "dampers": [],
         "friction": [],
+        "contact_areas": [
+            table.model_copy(update={"friction": None, "along": None, "along_against": None})
+            for table in scene.contact_areas
+        ],
         "round_clearances": [
             table.model_copy(update={"friction": 0.0}) for table in scene.round_clearances
         ],

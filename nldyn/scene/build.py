@@ -23,6 +23,7 @@ from nldyn.reduction.load_case import system_of_reduced
 from nldyn.runtime.progress import Progress
 from nldyn.scene.checks import check_ratio_count
 from nldyn.scene.component import build_component
+from nldyn.scene.contact import area_stops, told_of_areas
 from nldyn.scene.faults import told_as, within_component
 from nldyn.scene.load_case import load_case_of
 from nldyn.scene.matrices import build_matrices, skew_matrices
@@ -159,7 +160,7 @@ def build_reduced(
                 "" if getattr(component, "damping", None) is not None else "; they change nothing"
             )
             logger.info(f"kept modes that no interface can see: {numbers}{alone}")
-        for sentence in told_of_seen(reduced, table.modes):
+        for sentence in (*told_of_seen(reduced, table.modes), *told_of_areas(scene, reduced)):
             logger.info(sentence)
         return reduced
 
@@ -441,6 +442,7 @@ def check_held(scene: Scene, reduced: cms.ReducedModel) -> None:
     """Refuse what nothing holds: rigid-body motions that no spring and no stop feels."""
     rigid = reduced.frequencies_hz == 0.0
     ends = [end for stop in (*scene.stops, *scene.round_clearances) for end in ends_of(stop)]
+    ends += [(stop.at, stop.against) for stop in area_stops(scene)]
     ends += [(spring.at, spring.against) for spring in scene.interface_springs.values()]
     seen = [_stretch(reduced, *pair) for pair in ends]
     felt = np.array([row[rigid] / np.abs(row).max() for row in seen if row.any()])

@@ -71,6 +71,7 @@ def check_scene(scene: Scene, file: Path) -> None:
     _check_joints(scene, report)
     _check_interface_names(scene, report)
     _check_absolute(scene, report)
+    _check_areas(scene, report)
     _check_seeds(scene, report)
     _check_explore(scene, report)
 
@@ -528,6 +529,19 @@ def _check_absolute(scene: Scene, report: Report) -> None:
         raise report(("observe", "absolute"), fault)
 
 
+def _check_areas(scene: Scene, report: Report) -> None:
+    """Refuse areas of a mesh where there is none, or where the modes are chosen by a tolerance."""
+    for number, area in enumerate(scene.contact_areas):
+        if not isinstance(area.at, str):
+            continue
+        key = ("contact_areas", number, "at")
+        if scene.mesh is None:
+            raise report(key, "names a set of a mesh, and there is no [mesh]: list interfaces")
+        if scene.reduction is not None and scene.reduction.tolerance is not None:
+            fault = "does not go with reduction.tolerance; give 'modes' or 'cutoff_hz'"
+            raise report(key, fault)
+
+
 def _check_seeds(scene: Scene, report: Report) -> None:
     if scene.continuation is None:
         return
@@ -567,6 +581,11 @@ def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
         for number, entry in enumerate(getattr(scene, kind)):
             if entry.against is not None:
                 yield (kind, number, "against"), entry.against
+    for number, area in enumerate(scene.contact_areas):
+        for key in ("at", "against", "along", "along_against"):
+            named = getattr(area, key)
+            if isinstance(named, list) and isinstance(area.at, list):
+                yield from ((("contact_areas", number, key), name) for name in named)
     for number, around in enumerate(scene.round_clearances):
         for key, names in (("plane", around.plane), ("against", around.against or ())):
             yield from ((("round_clearances", number, key), name) for name in names)

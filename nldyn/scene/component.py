@@ -10,6 +10,7 @@ import fem
 from nldyn.base.errors import SceneError
 from nldyn.base.resources import data_directory
 from nldyn.scene.checks import check_mesh_names, check_structure_names
+from nldyn.scene.contact import with_areas
 from nldyn.scene.described_parts import told_otherwise, with_described_parts
 from nldyn.scene.faults import check_regular, told_as, unreadable
 from nldyn.scene.messages import KeyPath, scene_error
@@ -67,7 +68,7 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
             with told_as(scene, ("mesh", "file"), fem.ModelError, hint=": --meshes"):
                 structure = fem.refined(structure, refinement)
         with told_as(scene, (), fem.ModelError):
-            return _loaded(scene, fem.assemble(_structure_model(scene, structure)))
+            return _touching(scene, fem.assemble(_structure_model(scene, structure)), refinement)
     with told_as(scene, ("mesh", "file"), fem.ModelError):
         mesh = _in_metres(scene, fem.read_mesh(path, _mesh_places(scene), ignore))
     mesh = _noted(scene, _with_places(scene, mesh))
@@ -76,7 +77,15 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
     with told_as(scene, (), fem.ModelError):
         if refinement > 1:
             mesh = fem.refined(mesh, refinement)
-        return _loaded(scene, fem.assemble(_frame_model(scene, mesh)))
+        return _touching(scene, fem.assemble(_frame_model(scene, mesh)), refinement)
+
+
+def _touching(scene: Scene, component: Loaded, refinement: int) -> Loaded:
+    """The component with its load vectors and areas of contact, whose points go with the mesh."""
+    if refinement > 1 and any(isinstance(table.at, str) for table in scene.contact_areas):
+        fault = "go with the mesh: compare modes or methods, not meshes"
+        raise scene_error(scene.file, ("contact_areas",), fault)
+    return with_areas(scene, _loaded(scene, component))
 
 
 def _loaded(scene: Scene, component: Loaded) -> Loaded:

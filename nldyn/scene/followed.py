@@ -24,6 +24,7 @@ OF_LISTS = {  # the keys of each list of tables that may change
     "dampers": ("coefficient",),
     "friction": ("coefficient", "normal_force"),
     "round_clearances": (*SHARED, "clearance", "friction", "eccentricity"),
+    "contact_areas": ("gap", "stiffness", "friction"),
     "springs": ("stiffness", "coefficients"),
 }
 SHORT = {
@@ -101,6 +102,8 @@ def _of_element(scene: Scene, kind: str, number: int, key: list[str]) -> Paramet
             key = [("first_eccentricity", "second_eccentricity")[place]]
         own = "rubbing_friction" if key[0] == "friction" else key[0]
         return Parameter(own, len(scene.stops) + number)
+    if kind == "contact_areas":
+        return Parameter(f"area_{key[0]}", number)
     if kind == "excitation":
         if getattr(table, key[0]) is None or table.kind == "base":
             fault = f"names '{name}', which one of kind '{table.kind}' has not, or must keep"

@@ -49,6 +49,7 @@ ModeFrequency = Annotated[NotNegative, Field(le=1e12)]
 Period = Annotated[int, Field(ge=1, le=100)]
 Matrix = list[list[Number]]
 Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 Direction = Literal["x", "y", "rotation", "z", "rotation_x", "rotation_y", "rotation_z"]
 
 
@@ -657,6 +658,105 @@ class RoundClearanceTable(Table):
         return list(zip(self.plane, self.against, strict=True))
 
 
+class ContactAreaTable(Table):
+    """``[[contact_areas]]``: [a face or an edge that touches](../how-to/contact_areas.md)."""
+
+    at: str | Annotated[list[str], Field(min_length=1)]
+    """Face of solids or shells, edge of plane solids, part of beams or set of points of the mesh;
+    or a list of interfaces."""
+    name: str = ""
+    """What reports call it; `at` unless given."""
+    stiffness: Positive
+    """[N/m^exponent per m², m or point] Stiffness of the contact: per area of a face, per length of
+    an edge or of beams; at each point node by node, or of a list without `weights`."""
+    law: Literal["linear", "hertz"] = "linear"
+    """`"linear"` for a foundation that lifts off, or `"hertz"` for a power of the penetration."""
+    exponent: Annotated[float, Field(ge=1, le=LARGEST_EXPONENT)] | None = None
+    """Exponent of the law `"hertz"`, from 1 to 4; 1.5 unless given."""
+    direction: Axis | Triple | None = None
+    """Axis or vector of the normal, along which the structure moves to close the gap: `"y"`,
+    `"-y"`, ... A mesh needs it."""
+    closes: Literal[1, -1] = 1
+    """Of a list of interfaces: `1` if positive displacements close the gap, `-1` if negative ones
+    do."""
+    points: Annotated[int, Field(ge=1, le=12)] | Literal["nodes"] = 1
+    """Of a mesh: points of contact in each direction of a facet or beam, at Gauss's places, from 1
+    to 12; or `"nodes"`: node by node."""
+    weights: Annotated[list[Positive], Field(min_length=1)] | None = None
+    """[m², m] Of a list of interfaces: areas or lengths that they stand for."""
+    gap: Number | Annotated[list[Number], Field(min_length=1)] = 0.0
+    """[m] Clearance at rest, one or at each point; a negative one is a preload."""
+    slope: Triple | None = None
+    """Of a mesh: change of the gap along x, y and z, where what it hits is a plane that is
+    inclined; at `centre` it is `gap`."""
+    radius: Number | None = None
+    """[m] Of a mesh: what it hits is a cylinder of this radius with its axis along `axis`, nearest
+    at `centre`, where the gap is `gap`; below 0 a hollow one."""
+    axis: Axis | Triple | None = None
+    """Axis of the cylinder; a ball unless given. In a plane frame `"z"`."""
+    centre: Triple | None = None
+    """[m] Place [x, y, z] of the mesh where the gap is `gap`; the middle of the points unless
+    given."""
+    against: str | Annotated[list[str], Field(min_length=1)] | None = None
+    """What moves on the other side: beams of the same mesh, in a structure nodes that lie opposite
+    to nodes, or a list of interfaces; the ground unless given."""
+    dissipation: NotNegative = 0.0
+    """[s/m] Loss of the contact (Hunt and Crossley): it grows with the penetration, 0 or more."""
+    dashpot: NotNegative = 0.0
+    """[N s/m per m², m or point] Dashpot parallel to the springs."""
+    pulls: bool = True
+    """`false`: the pressure of a linear law with a dashpot is never negative."""
+    friction: NotNegative | None = None
+    """Coefficient of Coulomb's friction at each point; needs `along`."""
+    along: Axis | Triple | Annotated[list[str], Field(min_length=1)] | None = None
+    """Axis or vector along the surface, in which it slides; of a list, interfaces."""
+    along_against: Annotated[list[str], Field(min_length=1)] | None = None
+    """The interfaces of the other side in that direction, of a list that has `against`."""
+    surface: NotNegative = 0.0
+    """[m] Of beams: distance of the surface from their axis."""
+    surface_against: NotNegative = 0.0
+    """[m] The same of the beams on the other side."""
+    attachment_modes: Annotated[int, Field(ge=0)] | None = None
+    """How many attachment modes the reduction gives to the area; chosen by `static_error` unless
+    given. `nldyn check` tells both."""
+    static_error: Annotated[float, Field(gt=0, lt=1)] = 1e-2
+    """Share of the static deflection of structure and contact together, under any load at the
+    points, that the attachment modes may miss."""
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> ContactAreaTable:
+        if self.law == "linear":
+            _refuse(self, ("exponent",), "law 'linear'")
+        if (self.friction is None) != (self.along is None):
+            raise ValueError("needs both 'friction' and 'along', or neither")
+        if self.axis is not None and self.radius is None:
+            raise ValueError("has 'axis', which needs the 'radius' of a cylinder")
+        if self.radius == 0.0:
+            raise ValueError("needs a 'radius' other than 0")
+        of_mesh = ("direction", "slope", "radius", "axis", "centre", "attachment_modes")
+        listed = isinstance(self.at, list)
+        if listed:
+            _refuse(self, of_mesh, "a list of interfaces")
+            if len(set(self.at)) < len(self.at):
+                raise ValueError("must name each interface once in 'at'")
+        else:
+            _refuse(self, ("weights", "along_against"), "an area of a mesh")
+            if self.direction is None:
+                raise ValueError("needs 'direction', the normal along which the gap closes")
+        for key in ("against", "along"):
+            value = getattr(self, key)
+            names = isinstance(value, list) and all(isinstance(each, str) for each in value)
+            if value is not None and names != listed:
+                wanted = "a list of interfaces" if listed else "a name or an axis"
+                raise ValueError(f"needs {wanted} in '{key}', as in 'at'")
+        return self
+
+    @property
+    def called(self) -> str:
+        """Its name."""
+        return self.name or (self.at if isinstance(self.at, str) else "contact area")
+
+
 class StopTable(Table):
     """``[[stops]]``: a stop that an interface hits."""
 
@@ -1117,6 +1217,7 @@ class Scene(StructureTables):
     dampers: list[DamperTable] = []
     stops: list[AnyStopTable] = []
     round_clearances: list[RoundClearanceTable] = []
+    contact_areas: list[ContactAreaTable] = []
     friction: list[FrictionTable] = []
     excitation: list[ExcitationTable] = []
     observe: ObserveTable | None = None
@@ -1128,6 +1229,7 @@ class Scene(StructureTables):
     _file: Path = PrivateAttr(default=Path("scene.toml"))
     _text: str = PrivateAttr(default="")
     _mesh_folders: tuple[Path, ...] = PrivateAttr(default=())
+    _areas_found: Any = PrivateAttr(default=None)  # what `nldyn.scene.contact` found in the mesh
 
     @property
     def file(self) -> Path:
@@ -1178,9 +1280,7 @@ class Scene(StructureTables):
     @property
     def rotations(self) -> frozenset[str]:
         """The interfaces that turn."""
-        return frozenset(
-            name for name in self.interface_names if is_angle(self.direction_at(name))
-        )
+        return frozenset(name for name in self.interface_names if is_angle(self.direction_at(name)))
 
     @property
     def load_names(self) -> list[str]:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from nldyn.base.errors import SystemModelError
+from nldyn.scene.contact import area_stops
 from nldyn.scene.faults import check_regular, told_as, unreadable
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema import (
@@ -42,6 +43,7 @@ def acting_elements(scene: Scene) -> Elements:
             stops=(
                 *_rough(scene, [_stop(stop) for stop in scene.stops]),
                 *map(_round_stop, scene.round_clearances),
+                *area_stops(scene),
             ),
             dampers=(*map(_damper, scene.dampers), *map(_dry, dry_tables(scene))),
             excitation=tuple(

@@ -110,9 +110,7 @@ class ClosedWalks:
                 yield set(), box.within([orbit])
 
 
-def _known_states(
-    here: Section, branches: Sequence[Branch], rng: np.random.Generator
-) -> Real:
+def _known_states(here: Section, branches: Sequence[Branch], rng: np.random.Generator) -> Real:
     """States (k, 2n) at phase zero of some motions at a value, and of known orbits near it."""
     flow, omega = here.flow, here.omega
     starts = random_states(flow, omega, MOTIONS, int(rng.integers(2**31)))

@@ -122,6 +122,66 @@ def contact_area(
     )
 
 
+def gap_beside(
+    places: ArrayLike,
+    normal: ArrayLike,
+    centre: ArrayLike,
+    *,
+    slope: ArrayLike | None = None,
+    radius: float | None = None,
+    axis: ArrayLike | None = None,
+) -> Real:
+    """How much wider the gap to a second profile is at places than at its centre, (k,) in m.
+
+    Parameters
+    ----------
+    places : (k, 3) array_like
+        Points in m.
+    normal : (3,) array_like
+        Along which the gap closes.
+    centre : (3,) array_like
+        Where it is none.
+    slope : (3,) array_like, optional
+        Of a plane: change along x, y and z.
+    radius : float, optional
+        In m, of a cylinder, or of a ball without an axis, that is nearest at the centre; below 0 of
+        a hollow one.
+    axis : (3,) array_like, optional
+        Of the cylinder.
+
+    Raises
+    ------
+    SystemModelError
+        For a place farther from the centre than the radius, or an axis along the normal.
+
+    Examples
+    --------
+    >>> gap_beside([[0.0, 0, 0], [0.3, 0, 0]], [0, 1, 0], [0, 0, 0], radius=0.5).round(12).tolist()
+    [0.0, 0.1]
+    """
+    n = numbers("normal", normal)
+    away = np.atleast_2d(numbers("places", places)) - numbers("centre", centre)
+    wider = np.zeros(len(away))
+    if slope is not None:
+        wider += away @ numbers("slope", slope)
+    if radius is None:
+        return wider
+    across = away - np.outer(away @ n, n)
+    if axis is not None:
+        along = numbers("axis", axis) - (numbers("axis", axis) @ n) * n
+        if not np.linalg.norm(along) > 0.0:
+            raise SystemModelError("the axis of a cylinder lies along the normal")
+        along /= np.linalg.norm(along)
+        across -= np.outer(across @ along, along)
+    far = np.linalg.norm(across, axis=1)
+    if np.any(far > abs(radius)):
+        raise SystemModelError(
+            f"a point lies {far.max():g} m from the centre, beyond the radius of {abs(radius):g} m"
+        )
+    # R - sqrt(R² - s²) without its cancellation
+    return wider + np.copysign(far**2 / (abs(radius) + np.sqrt(radius**2 - far**2)), radius)
+
+
 def _of_points(owner: str, name: str, values: ArrayLike, count: int) -> Real:
     """A number of each point, (n,)."""
     found = numbers(f"{owner}: {name}", values)
