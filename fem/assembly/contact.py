@@ -348,7 +348,7 @@ def opposite_points(
     mesh, normal = component.model.mesh, points.direction
     if isinstance(component, Component) and points.measure != "node":
         lines = _frame_lines(component, at)
-        ends = mesh.points[mesh.lines[lines]]
+        ends = mesh.points[component.model.mesh.lines[lines]]
         flat = np.eye(3) - np.outer(normal, normal)
         start, span = ends[:, 0] @ flat, (ends[:, 1] - ends[:, 0]) @ flat
         away = points.places[:, None] @ flat - start

@@ -661,7 +661,7 @@ class RoundClearanceTable(Table):
 class ContactAreaTable(Table):
     """``[[contact_areas]]``: [a face or an edge that touches](../how-to/contact_areas.md)."""
 
-    at: str | Annotated[list[str], Field(min_length=1)]
+    at: str | list[str]
     """Face of solids or shells, edge of plane solids, part of beams or set of points of the mesh;
     or a list of interfaces."""
     name: str = ""
@@ -745,7 +745,7 @@ class ContactAreaTable(Table):
                 raise ValueError("needs 'direction', the normal along which the gap closes")
         for key in ("against", "along"):
             value = getattr(self, key)
-            names = isinstance(value, list) and all(isinstance(each, str) for each in value)
+            names = isinstance(value, list) and isinstance(value[0], str)
             if value is not None and names != listed:
                 wanted = "a list of interfaces" if listed else "a name or an axis"
                 raise ValueError(f"needs {wanted} in '{key}', as in 'at'")

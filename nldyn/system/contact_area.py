@@ -178,8 +178,8 @@ def gap_beside(
         raise SystemModelError(
             f"a point lies {far.max():g} m from the centre, beyond the radius of {abs(radius):g} m"
         )
-    # R - sqrt(R² - s²) without its cancellation
-    return wider + np.copysign(far**2 / (abs(radius) + np.sqrt(radius**2 - far**2)), radius)
+    sagitta = far**2 / (abs(radius) + np.sqrt(radius**2 - far**2))  # R - √(R² - s²), no digits lost
+    return np.asarray(wider + np.copysign(sagitta, radius))
 
 
 def _of_points(owner: str, name: str, values: ArrayLike, count: int) -> Real:

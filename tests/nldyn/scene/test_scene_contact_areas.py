@@ -1,0 +1,142 @@
+"""Areas of contact in scenes."""
+
+import numpy as np
+import pytest
+
+from nldyn import Parameter, SceneError
+from nldyn.base.resources import example
+from nldyn.report.stop_spheres import not_drawn
+from nldyn.scene import build_reduced, build_system, load_scene
+from nldyn.scene.contact import areas_found
+from nldyn.scene.followed import followed_parameter
+from nldyn.scene.load_case import load_case_of
+
+LISTED = """
+[modal]
+frequencies_hz = [1.0, 3.1, 5.0]
+participation.tip = [1.0, 0.3, 0.1]
+participation.left = [1.0, -0.5, 0.2]
+participation.right = [1.0, 0.5, -0.1]
+participation.slide = [0.3, 0.5, 0.9]
+
+[[contact_areas]]
+at = ["left", "right"]
+name = "pads"
+stiffness = 40.0
+weights = [0.5, 0.25]
+gap = [0.1, 0.2]
+
+[[excitation]]
+at = "tip"
+kind = "harmonic"
+amplitude = 1.0
+
+[continuation]
+range_hz = [0.5, 2.0]
+"""
+
+
+def scene_of(tmp_path, text):
+    file = tmp_path / "scene.toml"
+    file.write_text(text)
+    return load_scene(file)
+
+
+def landing(tmp_path, *changes):
+    """The example with lines of its text changed."""
+    path = example("landing_strip.toml")
+    text = path.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    mesh = (path.parent / "../../meshes/strip.msh").resolve()
+    file = tmp_path / "scene.toml"
+    file.write_text(text.replace("../../meshes/strip.msh", str(mesh)))
+    return load_scene(file, [mesh.parent])
+
+
+def test_points_of_an_edge_have_the_stiffness_and_the_gap_of_the_profile():
+    system = build_system(load_scene(example("landing_strip.toml")))
+    stops = system.area_stops("support")
+    assert len(stops) == 40 and system.areas == {"support": tuple(range(40))}
+    assert np.isclose(sum(stop.stiffness for stop in stops), 2e5 * 0.3)
+    (found,) = areas_found(load_scene(example("landing_strip.toml")))
+    x = found.places[:, 0]
+    assert np.allclose([s.gap for s in stops], 1e-4 + 20.0 - np.sqrt(20.0**2 - x**2), atol=1e-15)
+
+
+def test_the_reduction_gives_an_area_few_attachment_modes_and_tells_the_error(tmp_path):
+    scene = landing(tmp_path)
+    loose = build_reduced(scene)
+    tight = build_reduced(landing(tmp_path, ("points = 2", "points = 2\nstatic_error = 1e-5")))
+    asked = build_reduced(landing(tmp_path, ("points = 2", "points = 2\nattachment_modes = 2")))
+    assert asked.areas["support"].modes == 2
+    assert asked.areas["support"].static_error > loose.areas["support"].static_error
+    assert loose.areas["support"].static_error <= 1e-2
+    assert tight.areas["support"].static_error <= 1e-5
+    assert asked.size < loose.size < tight.size < 44
+
+
+@pytest.mark.parametrize("key", ["gap", "stiffness"])
+def test_numbers_of_an_area_are_keys_that_may_be_followed(tmp_path, key):
+    text = LISTED.replace(
+        "range_hz = [0.5, 2.0]",
+        f'parameter = "contact_areas.0.{key}"\nrange = [0.01, 0.3]\nfrequency_hz = 1.2',
+    )
+    scene = scene_of(tmp_path, text)
+    assert followed_parameter(scene) == Parameter(f"area_{key}", 0)
+    assert not_drawn(scene) == ["contact area 'pads', which is many points"]
+
+
+def test_a_list_of_interfaces_shares_a_law(tmp_path):
+    system = build_system(scene_of(tmp_path, LISTED))
+    assert [stop.stiffness for stop in system.stops] == [20.0, 10.0]
+    assert [stop.gap for stop in system.stops] == [0.1, 0.2]
+    rough = LISTED.replace("gap = [", 'friction = 0.2\nalong = ["slide", "tip"]\ngap = [')
+    sliders = build_system(scene_of(tmp_path, rough)).sliders
+    assert [(slider.at, slider.stop) for slider in sliders] == [("slide", 0), ("tip", 1)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("stiffness = 40.0", "stiffness = -40.0", "greater than 0"),
+        ("weights = [0.5, 0.25]", "weights = [0.5]", "one number or one for each of 2 points"),
+        ('at = ["left", "right"]', 'at = ["left", "left"]', "each interface once"),
+        ('at = ["left", "right"]', "at = []", "there are no points"),
+        ('at = ["left", "right"]', 'at = ["left", "up"]', "up"),
+        ('at = ["left", "right"]', 'at = "left"', "is not a key of an area of a mesh"),
+        ("weights = [0.5, 0.25]", "friction = 0.2", "needs both 'friction' and 'along'"),
+        ("weights = [0.5, 0.25]", "radius = 2.0", "is not a key of a list of interfaces"),
+    ],
+)
+def test_what_makes_no_area_of_interfaces_is_refused(tmp_path, old, new, said):
+    with pytest.raises(SceneError, match=said):
+        build_system(scene_of(tmp_path, LISTED.replace(old, new)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('direction = "-y" ', "", "needs 'direction'"),
+        ('direction = "-y" ', 'direction = "z" ', "nothing of it moves along"),
+        ('at = "strip"', 'at = "stripe"', "stripe"),
+        ('at = "strip"', 'at = "tip"', "no beam has all its nodes in it"),
+        ("gap = 1e-4", "gap = [1e-4, 2e-4]", "gap has 2 values, but the area has 40 points"),
+        ("radius = 20.0", "radius = 0.1", "beyond the radius"),
+        ("modes = 4", "tolerance = 0.01", "does not go with reduction.tolerance"),
+        ("points = 2", 'points = 2\nagainst = "root"', "no beam has all its nodes in it"),
+    ],
+)
+def test_what_makes_no_area_of_a_mesh_is_refused(tmp_path, old, new, said):
+    with pytest.raises(SceneError, match=said):
+        build_system(landing(tmp_path, (old, new)))
+
+
+def test_a_convergence_study_refuses_to_refine_what_the_points_go_with(tmp_path):
+    from nldyn.scene.component import build_component
+
+    scene = landing(tmp_path)
+    assert len(load_case_of(scene).stops) == 40
+    with pytest.raises(SceneError, match="go with the mesh"):
+        build_component(scene, refinement=2)
