@@ -1,15 +1,13 @@
-"""Frames and structures: from a mesh to stiffness, mass and interfaces."""
+"""Structures: from a mesh to stiffness, mass and interfaces."""
 
-from fem.assembly.assemble import assemble
+from fem.assembly.component import Component, DistortionWarning, LockingWarning, assemble
 from fem.assembly.contact import ContactPoints, contact_points, opposite_points, unit_vector
-from fem.assembly.frame import Component
-from fem.assembly.structure import DistortionWarning, LockingWarning, StructureComponent
 from fem.assembly.summary import MassProperties, mass_properties, summary
 from fem.base.errors import JointWarning, ModelError
 from fem.checks.unlikely import UnlikelyWarning
 from fem.formats.abaqus import read_abaqus
-from fem.formats.from_meshio import from_meshio, structure_from_meshio
-from fem.formats.read import read_mesh, read_structure
+from fem.formats.from_meshio import from_meshio
+from fem.formats.read import read_mesh
 from fem.formats.write import write_mesh
 from fem.mesh.attachments import (
     Attachments,
@@ -22,14 +20,13 @@ from fem.mesh.attachments import (
     PointSpring,
     Support,
 )
-from fem.mesh.frame_mesh import FrameMesh, frame_mesh
+from fem.mesh.frames import frame_mesh
 from fem.mesh.pieces import Pieces, pieces_of
 from fem.mesh.places import node_at, nodes_inside
 from fem.mesh.refine import refined
-from fem.mesh.structure_mesh import StructureMesh, box_mesh, joined, structure_mesh
+from fem.mesh.structure_mesh import StructureMesh, box_mesh, joined
 from fem.model.calibrate import Calibration, calibrate
 from fem.model.described import parts_of
-from fem.model.frame import FrameModel
 from fem.model.parts import BeamPart, Material, ShellPart, SolidPart, TrussPart
 from fem.model.plates import Layer, PlateSection, layered
 from fem.model.sections import (
@@ -56,8 +53,6 @@ __all__ = [
     "CrossSection",
     "DistortionWarning",
     "Foundation",
-    "FrameMesh",
-    "FrameModel",
     "Hinge",
     "Interface",
     "JointWarning",
@@ -79,7 +74,6 @@ __all__ = [
     "Section",
     "ShellPart",
     "SolidPart",
-    "StructureComponent",
     "StructureMesh",
     "StructureModel",
     "Support",
@@ -102,10 +96,7 @@ __all__ = [
     "pieces_of",
     "read_abaqus",
     "read_mesh",
-    "read_structure",
     "refined",
-    "structure_from_meshio",
-    "structure_mesh",
     "summary",
     "symmetry",
     "unit_vector",

@@ -69,7 +69,7 @@ def read_dimensions(path: Path = DIMENSIONS) -> Dimensions:
 
 def half_beam_mesh(
     dimensions: Dimensions, beam_elements: int = BEAM_ELEMENTS, leaf_elements: int = LEAF_ELEMENTS
-) -> fem.FrameMesh:
+) -> fem.StructureMesh:
     """Half the beam from its left end to the middle, with its leaf spring."""
     points = {
         "corner": (0.0, 0.0),
@@ -85,7 +85,7 @@ def half_beam_mesh(
 
 def full_beam_mesh(
     dimensions: Dimensions, beam_elements: int = BEAM_ELEMENTS, leaf_elements: int = LEAF_ELEMENTS
-) -> fem.FrameMesh:
+) -> fem.StructureMesh:
     """The whole beam with both leaf springs."""
     length, leaf = dimensions.beam_length, dimensions.leaf_length
     points = {
@@ -172,37 +172,39 @@ def solid_half_beam_model(
 
 
 def half_beam_model(
-    mesh: fem.FrameMesh, middle_mass: float, beam: fem.BeamPart = BEAM
-) -> fem.FrameModel:
+    mesh: fem.StructureMesh, middle_mass: float, beam: fem.BeamPart = BEAM
+) -> fem.StructureModel:
     """Half the beam: symmetric at the middle, with half of the mass there; foot clamped."""
-    return fem.FrameModel(
+    return fem.StructureModel(
         mesh,
         parts={**PARTS, "beam": beam},
         supports=[fem.Support("middle", ("x", "rotation")), fem.Support("foot", CLAMP)],
         point_masses=[fem.PointMass("middle", middle_mass / 2)],
         interfaces={"middle": fem.Interface("middle", "y")},
+        plane=True,
     )
 
 
-def full_beam_model(mesh: fem.FrameMesh, middle_mass: float) -> fem.FrameModel:
+def full_beam_model(mesh: fem.StructureMesh, middle_mass: float) -> fem.StructureModel:
     """The whole beam with both feet clamped."""
-    return fem.FrameModel(
+    return fem.StructureModel(
         mesh,
         parts=PARTS,
         supports=[fem.Support("foot_left", CLAMP), fem.Support("foot_right", CLAMP)],
         point_masses=[fem.PointMass("middle", middle_mass)],
         interfaces={"middle": fem.Interface("middle", "y")},
+        plane=True,
     )
 
 
-def tube_mesh() -> fem.FrameMesh:
+def tube_mesh() -> fem.StructureMesh:
     """A tube of a heat exchanger, 1.8 m between tube sheets, with a baffle in the middle."""
     places = {"left": (0.0, 0.0), "baffle": (0.9, 0.0), "quarter": (1.35, 0.0), "right": (1.8, 0.0)}
     ends = ("left", "baffle", 16), ("baffle", "quarter", 8), ("quarter", "right", 8)
     return fem.frame_mesh(places, [("tube", *pair) for pair in ends])
 
 
-def strip_mesh() -> fem.FrameMesh:
+def strip_mesh() -> fem.StructureMesh:
     """A cantilever of 0.3 m."""
     return fem.frame_mesh({"root": (0.0, 0.0), "tip": (0.3, 0.0)}, [("strip", "root", "tip", 20)])
 

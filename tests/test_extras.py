@@ -47,7 +47,7 @@ import fem
 from nldyn import Stop, System, Unbalance, continue_branch, load, save, solve_orbit
 made = fem.box_mesh("bar", (1.0, 0.1, 0.1), (2, 1, 1))
 fem.write_mesh(made, "bar.vtu")
-assert (fem.read_structure("bar.vtu").points == made.points).all()
+assert (fem.read_mesh("bar.vtu").points == made.points).all()
 system = System.from_matrices(
     [[2.48]], [[16877.0]], {"middle": [1.0]}, modal_damping=0.0142,
     stops=[Stop("middle", stiffness=5.17e9)], excitation=[Unbalance("middle", 4.92e-6)],

@@ -13,11 +13,12 @@ import fem
 length, width, height = 0.5, 0.03, 0.005
 steel = fem.Material(youngs_modulus=2.1e11, density=7800.0)
 mesh = fem.frame_mesh({"root": (0, 0), "tip": (length, 0)}, [("arm", "root", "tip", 40)])
-model = fem.FrameModel(
+model = fem.StructureModel(
     mesh,
     {"arm": fem.BeamPart(steel, fem.RectangularSection(width, height))},
     supports=[fem.Support("root", ("x", "y", "rotation"))],
     interfaces={"tip": fem.Interface("tip", "y")},
+    plane=True,
 )
 beam = fem.assemble(model)
 reduced = cms.reduce(beam, modes=4, method="truncation")

@@ -12,11 +12,12 @@ import fem
 
 steel = fem.Material(youngs_modulus=2.1e11, density=7800.0)
 mesh = fem.frame_mesh({"root": (0, 0), "end": (0.5, 0)}, [("arm", "root", "end", 20)])
-model = fem.FrameModel(
+model = fem.StructureModel(
     mesh,
     {"arm": fem.BeamPart(steel, fem.RectangularSection(0.03, 0.01))},
     supports=[fem.Support("root", ("x", "y", "rotation"))],
     interfaces={"y": fem.Interface("end", "y"), "turn": fem.Interface("end", "rotation")},
+    plane=True,
 )
 half = fem.assemble(model)
 

@@ -12,10 +12,11 @@ import fem
 
 mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 40)])
 steel = fem.Material(youngs_modulus=2.1e11, density=7800.0)
-model = fem.FrameModel(
+model = fem.StructureModel(
     mesh,
     {"arm": fem.BeamPart(steel, fem.RectangularSection(0.03, 0.005))},
     supports=[fem.Support("root", ("x", "y", "rotation"))],
+    plane=True,
 )
 beam = fem.assemble(model)
 reduced = cms.reduce(beam, modes=8, method="truncation")

@@ -12,11 +12,12 @@ import fem
 
 mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 30)])
 steel = fem.Material(youngs_modulus=2.1e11, density=7800.0)
-model = fem.FrameModel(
+model = fem.StructureModel(
     mesh,
     {"arm": fem.BeamPart(steel, fem.RectangularSection(0.03, 0.01))},
     supports=[fem.Support("root", ("x", "y", "rotation"))],
     interfaces={"tip": fem.Interface("tip", "y")},
+    plane=True,
 )
 beam = fem.assemble(model)
 known = 1.0 / (3 * 2.1e11 * 0.03 * 0.01**3 / 12)

@@ -57,7 +57,10 @@ class Numbering:
 
 
 def number_blocks(model: StructureModel) -> Numbering:
-    """Translations for all nodes of parts and coupled points; rotations where something turns."""
+    """Translations for all nodes of parts and coupled points; rotations where something turns.
+
+    In a frame in the plane they follow each other node by node, else all rotations come last.
+    """
     count = len(model.mesh.points)
     moves, turns = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
     for _, kinds in (*model.solids.values(), *model.trusses.values()):
@@ -70,12 +73,13 @@ def number_blocks(model: StructureModel) -> Numbering:
             turns[nodes] = True
     _number_attached(model, moves | turns, moves, turns)
     moves |= turns
-    translation = np.where(moves, np.cumsum(moves) - 1, -1)
-    first = int(moves.sum())
-    rotation = np.where(turns, first + np.cumsum(turns) - 1, -1)
-    first += int(turns.sum())
-    hinged = first + np.arange(len(model.hinges))
-    return Numbering(translation, rotation, hinged, first + len(model.hinges))
+    node_by_node = model.plane and not model.solids
+    has = np.stack([moves, turns], axis=1 if node_by_node else 0)
+    numbers = np.where(has, np.cumsum(has).reshape(has.shape) - 1, -1)
+    translation, rotation = numbers.T if node_by_node else numbers
+    count = int(has.sum())
+    hinged = count + np.arange(len(model.hinges))
+    return Numbering(translation, rotation, hinged, count + len(model.hinges))
 
 
 def _number_attached(
@@ -274,10 +278,11 @@ def point_dof(model: StructureModel, numbering: Numbering, point: str, direction
     """The degree of freedom of a named point, or a ModelError where it has none."""
     dof = int(numbering.dofs(np.array([model.mesh.node(point)]))[0, axis_index(direction)])
     if dof < 0:
-        moved = "does not turn" if axis_index(direction) > 2 else "is on no part of the model"
+        fault = "is on no part of the model; couple a face to it"
+        if axis_index(direction) > 2:
+            fault = "does not turn, since only solids or trusses meet there; couple a face to it"
         raise ModelError(
-            f"{model.mesh.source}: {point!r} has no direction {direction!r}: it {moved}; couple a"
-            " face to it"
+            f"{model.mesh.source}: {point!r} has no direction {direction!r}: it {fault}"
         )
     return dof
 
@@ -304,7 +309,7 @@ def _check_coupling(
 
 def _held(model: StructureModel, numbering: Numbering) -> IntArray:
     held = []
-    if model.is_plane:
+    if model.plane:
         out = [axis_index(name) for name in AXES if name not in IN_PLANE]
         held.append(numbering.dofs(np.arange(len(model.mesh.points)))[:, out].ravel())
         held += [3 * numbering.hinged, 3 * numbering.hinged + 1]
@@ -353,7 +358,7 @@ def coupled(
     what = f"{model.mesh.source}: coupling of {coupling.face!r} to {coupling.point!r}"
     if len(nodes) == 0:
         raise ModelError(f"{what}: the face has no node of a part")
-    axes = [axis_index(name) for name in IN_PLANE] if model.is_plane else list(range(6))
+    axes = [axis_index(name) for name in IN_PLANE] if model.plane else list(range(6))
     translations = [axis for axis in axes if axis < 3]
     arms = model.mesh.points[nodes] - model.mesh.points[node]
     rigid = rigid_motions(arms)
@@ -422,7 +427,7 @@ def face_products(model: StructureModel, face: str, nodes: IntArray) -> SparseAr
         at = position[cells]
         inside = (at >= 0).all(axis=1)
         products = facet_products(kind, model.mesh.points[cells[inside]])
-        found = sparse.csr_array(found + dense_scatter(products, at[inside], len(nodes)))
+        found = sparse.csr_array(found + dense_scatter([(products, at[inside])], len(nodes)))
     return found
 
 

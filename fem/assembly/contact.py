@@ -9,15 +9,12 @@ import numpy as np
 from scipy import sparse
 from skfem.quadrature import get_quadrature
 
-from fem.assembly.frame import Component
-from fem.assembly.structure import StructureComponent, beam_dofs, beam_motions
+from fem.assembly.component import Component
+from fem.assembly.structure import beam_dofs, beam_motions
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
-from fem.elements.beams import hermite
 from fem.elements.scatter import SparseArray
 from fem.mesh.cells import KINDS
-from fem.mesh.frame_mesh import FrameMesh
-from fem.model.parts import BeamPart
 
 AXES = ("x", "y", "z")
 FLAT = 1e-4  # 1 - cosine of the angle between the normals of what counts as flat
@@ -75,7 +72,7 @@ class ContactPoints:
 
 
 def contact_points(
-    component: Component | StructureComponent,
+    component: Component,
     at: str,
     direction: str | Sequence[float],
     *,
@@ -112,10 +109,11 @@ def contact_points(
     --------
     >>> import fem
     >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (2, 0)}, [("arm", "root", "tip", 4)])
-    >>> arm = fem.assemble(fem.FrameModel(
+    >>> arm = fem.assemble(fem.StructureModel(
     ...     mesh,
     ...     parts={"arm": fem.BeamPart(fem.Material(2e11, 7800.0), fem.Section(1e-3, 1e-8))},
     ...     supports=[fem.Support("root", ("x", "y", "rotation"))],
+    ...     plane=True,
     ... ))
     >>> fem.contact_points(arm, "arm", "y", points=3)
     <ContactPoints: 12 of 'arm', 2 m, 0 held>
@@ -124,7 +122,7 @@ def contact_points(
     """
     normal = unit_vector(at, direction)
     if points == "nodes":
-        blocks, measure = _node_block(component, at), "node"
+        blocks, measure = [_node_block(component, component.model.mesh.nodes(at))], "node"
     else:
         whole = isinstance(points, int) and not isinstance(points, bool)
         if not (whole and 1 <= int(points) <= MOST_PLACES):
@@ -132,11 +130,7 @@ def contact_points(
                 f"contact at {at!r}: points must be 'nodes' or a whole number from 1 to "
                 f"{MOST_PLACES}, not {points!r}"
             )
-        if isinstance(component, Component):
-            arm = surface * normal
-            blocks, measure = _frame_blocks(component, at, int(points), arm), "length"
-        else:
-            blocks, measure = _structure_blocks(component, at, int(points), surface, normal)
+        blocks, measure = _blocks(component, at, int(points), surface, normal)
     places, weights, motion = _gathered(component, blocks)
     size = np.abs(
         sparse.kron(sparse.eye_array(len(places)), np.abs(normal)[None], format="csr") @ abs(motion)
@@ -179,21 +173,15 @@ def unit_vector(at: str, direction: str | Sequence[float]) -> FloatArray:
 
 
 def _gathered(
-    component: Component | StructureComponent, blocks: Sequence[Block]
+    component: Component, blocks: Sequence[Block]
 ) -> tuple[FloatArray, FloatArray, SparseArray]:
     """Places (k, 3), weights (k,) and motion (3 k, N) of blocks of cells.
 
     A block has places (c, q, 3), weights (c, q), shapes (c, q, 3, d) and degrees of freedom (c, d)
     among all, -1 for none.
     """
-    if isinstance(component, Component):
-        size = 3 * len(component.model.mesh.points) + len(component.model.hinges)
-        free = component.free
-        unit = (np.ones(len(free)), (free, np.arange(len(free))))
-        to_free = sparse.csr_array(unit, shape=(size, len(free)))
-    else:
-        to_free = component.constraints.transformation
-        size = to_free.shape[0]
+    to_free = component.constraints.transformation
+    size = to_free.shape[0]
     motions = []
     for places, _, shapes, dofs in blocks:
         cells, count = places.shape[:2]
@@ -214,91 +202,15 @@ def _gathered(
     )
 
 
-def _node_block(component: Component | StructureComponent, at: str) -> list[Block]:
-    return _blocks_of_nodes(component, _nodes_at(component, at))
-
-
-def _blocks_of_nodes(component: Component | StructureComponent, nodes: IntArray) -> list[Block]:
-    mesh = component.model.mesh
-    if isinstance(component, Component):
-        dofs = np.stack([3 * nodes, 3 * nodes + 1, np.full_like(nodes, -1)], axis=1)
-    else:
-        dofs = component.numbering.dofs(nodes)[:, :3]
+def _node_block(component: Component, nodes: IntArray) -> Block:
+    dofs = component.numbering.dofs(nodes)[:, :3]
     shapes = np.broadcast_to(np.eye(3), (len(nodes), 1, 3, 3))
-    return [(mesh.points[nodes][:, None], np.ones((len(nodes), 1)), np.array(shapes), dofs)]
-
-
-def _nodes_at(component: Component | StructureComponent, at: str) -> IntArray:
-    """Nodes of a set, of a frame of a part, too, in ascending order."""
-    mesh = component.model.mesh
-    if isinstance(mesh, FrameMesh) and at in mesh.parts:
-        return np.unique(mesh.lines[mesh.part(at)])
-    return np.unique(mesh.nodes(at))
-
-
-def _frame_blocks(component: Component, at: str, points: int, arm: FloatArray) -> list[Block]:
-    """Lines of plane beams; their surface lies off the axis by an arm (3,)."""
-    lines = _frame_lines(component, at)
-    s, weights = gauss(points)
-    lengths = component.model.mesh.lengths[lines]
-    return [
-        _on_lines(
-            component,
-            np.repeat(lines, points),
-            np.tile(s, len(lines)),
-            np.outer(lengths, weights).ravel(),
-            arm,
-        )
-    ]
-
-
-def _frame_lines(component: Component, at: str) -> IntArray:
-    """The lines of beams of a part, or all of whose nodes are in a set."""
-    model, mesh = component.model, component.model.mesh
-    inside = np.zeros(len(mesh.points), dtype=np.bool_)
-    inside[_nodes_at(component, at)] = True
-    chosen = np.asarray(inside[mesh.lines].all(axis=1))
-    if at in mesh.parts:
-        chosen[:] = False
-        chosen[mesh.part(at)] = True
-    for name, part in model.parts.items():
-        if not isinstance(part, BeamPart):
-            chosen[mesh.part(name)] = False
-    lines = np.flatnonzero(chosen)
-    if not len(lines):
-        raise ModelError(f"{mesh.source}: contact at {at!r}: no beam has all its nodes in it")
-    return lines
-
-
-def _on_lines(
-    component: Component, lines: IntArray, s: FloatArray, weights: FloatArray, arm: FloatArray
-) -> Block:
-    """One place s (k,) from 0 to 1 on each of some lines (k,) of a frame, an arm off the axis."""
-    mesh = component.model.mesh
-    ends, lengths = mesh.points[mesh.lines[lines]], mesh.lengths[lines]
-    along = (ends[:, 1] - ends[:, 0]) / lengths[:, None]
-    cubic, slopes = hermite(s)
-    local = np.zeros((len(lines), 3, 6))  # along, across, rotation
-    local[:, 0, 0], local[:, 0, 3] = 1.0 - s, s
-    for k, dof in enumerate((1, 2, 4, 5)):
-        scale = lengths if k % 2 else np.ones(len(lines))
-        local[:, 1, dof], local[:, 2, dof] = scale * cubic[k], scale * slopes[k] / lengths
-    axes = np.zeros((len(lines), 3, 3))  # of these three, and what a rotation moves
-    axes[:, :, 0] = along
-    axes[:, 0, 1], axes[:, 1, 1] = -along[:, 1], along[:, 0]
-    axes[:, :, 2] = np.cross([0.0, 0.0, 1.0], arm)
-    to_local = np.zeros((len(lines), 6, 6))
-    for first in (0, 3):
-        to_local[:, first, first : first + 2] = along[:, :2]
-        to_local[:, first + 1, first : first + 2] = axes[:, :2, 1]
-        to_local[:, first + 2, first + 2] = 1.0
-    shapes = axes @ local @ to_local
-    places = ends[:, 0] + s[:, None] * (ends[:, 1] - ends[:, 0]) + arm
-    return places[:, None], weights[:, None], shapes[:, None], component.element_dofs[lines]
+    places = component.model.mesh.points[nodes][:, None]
+    return places, np.ones((len(nodes), 1)), np.array(shapes), dofs
 
 
 def opposite_points(
-    component: Component | StructureComponent,
+    component: Component,
     points: ContactPoints,
     at: str,
     *,
@@ -313,8 +225,8 @@ def opposite_points(
     points
         Those of the area.
     at
-        The other set: of a plane frame, beams, on which the points are found along the normal; of
-        a structure, nodes that lie opposite to nodes.
+        The other set: beams, on which the points are found along the normal; else, and opposite to
+        nodes, nodes.
     surface
         Distance in m, against the normal, of the surface from the axis of the other beams.
 
@@ -334,11 +246,12 @@ def opposite_points(
     >>> places = {"a": (0, 0), "b": (2, 0), "c": (0, 0.1), "d": (3, 0.1)}
     >>> mesh = fem.frame_mesh(places, [("low", "a", "b", 4), ("high", "c", "d", 5)])
     >>> beam = fem.BeamPart(fem.Material(2e11, 7800.0), fem.Section(1e-3, 1e-8))
-    >>> pair = fem.assemble(fem.FrameModel(
+    >>> pair = fem.assemble(fem.StructureModel(
     ...     mesh,
     ...     parts={"low": beam, "high": beam},
     ...     supports=[fem.Support(end, ("x", "y", "rotation")) for end in ("a", "c")],
     ...     separate=True,
+    ...     plane=True,
     ... ))
     >>> low = fem.contact_points(pair, "low", "y", points=1)
     >>> high = fem.opposite_points(pair, low, "high")
@@ -346,49 +259,67 @@ def opposite_points(
     True
     """
     mesh, normal = component.model.mesh, points.direction
-    if isinstance(component, Component) and points.measure != "node":
-        lines = _frame_lines(component, at)
-        ends = mesh.points[component.model.mesh.lines[lines]]
-        flat = np.eye(3) - np.outer(normal, normal)
-        start, span = ends[:, 0] @ flat, (ends[:, 1] - ends[:, 0]) @ flat
-        away = points.places[:, None] @ flat - start
+    beams = [] if points.measure == "node" else list(_beams_in(component, at))
+    flat = np.eye(3) - np.outer(normal, normal)
+    if beams:
+        ends = np.concatenate([mesh.points[lines] for _, lines, _ in beams]) @ flat
+        span, away = ends[:, 1] - ends[:, 0], points.places[:, None] @ flat - ends[:, 0]
         length = np.maximum((span**2).sum(axis=1), np.finfo(float).tiny)
         s = np.clip((away * span).sum(axis=2) / length, 0.0, 1.0)
-        off = np.linalg.norm(away - s[:, :, None] * span, axis=2)
-        nearest = off.argmin(axis=1)
-        rows = np.arange(len(nearest))
-        found, size = off[rows, nearest], float(np.sqrt(length.max()))
-        blocks = [
-            _on_lines(
-                component, lines[nearest], s[rows, nearest], points.weights, -surface * normal
-            )
-        ]
+        off, size = np.linalg.norm(away - s[:, :, None] * span, axis=2), float(length.max()) ** 0.5
     else:
-        nodes = _nodes_at(component, at)
-        across = mesh.points[nodes] - np.outer(mesh.points[nodes] @ normal, normal)
-        here = points.places - np.outer(points.places @ normal, normal)
-        far = np.linalg.norm(here[:, None] - across, axis=2)
-        nearest, size = far.argmin(axis=1), float(np.ptp(mesh.points, axis=0).max())
-        found = far.min(axis=1)
-        blocks = _blocks_of_nodes(component, nodes[nearest])
+        nodes = mesh.nodes(at)
+        off = np.linalg.norm((points.places[:, None] - mesh.points[nodes]) @ flat, axis=2)
+        size = float(np.ptp(mesh.points, axis=0).max())
+    nearest, found = off.argmin(axis=1), off.min(axis=1)
     if found.max() > OPPOSITE * size:
         place = ", ".join(f"{x:g}" for x in points.places[int(found.argmax())])
         raise ModelError(
             f"{mesh.source}: contact of {points.at!r} against {at!r}: nothing of that lies "
             f"opposite to the point at ({place})"
         )
+    order = np.arange(len(nearest))
+    if beams:
+        along = s[order, nearest]
+        blocks, order = _on_beams(component, beams, nearest, along, -surface * normal)
+    else:
+        blocks = [_node_block(component, nodes[nearest])]
     places, _, motion = _gathered(component, blocks)
-    return replace(points, at=at, places=places, motion=motion)
+    rows = (3 * order[:, None] + np.arange(3)).ravel()
+    return replace(points, at=at, places=places[order], motion=sparse.csr_array(motion[rows]))
 
 
-def _structure_blocks(
-    component: StructureComponent, at: str, points: int, surface: float, normal: FloatArray
+def _on_beams(
+    component: Component,
+    beams: Sequence[tuple[str, IntArray, IntArray]],
+    chosen: IntArray,
+    s: FloatArray,
+    arm: FloatArray,
+) -> tuple[list[Block], IntArray]:
+    """One place s (k,) on each of some lines (k,) out of those of all beams; where each block's is.
+
+    Lines are counted through all beams.
+    """
+    first, blocks, order = 0, [], []
+    for name, _, numbers in beams:
+        own = np.flatnonzero((chosen >= first) & (chosen < first + len(numbers)))
+        if len(own):
+            places = s[own, None]
+            at_lines = numbers[chosen[own] - first]
+            blocks.append(_beam_block(component, name, at_lines, places, np.ones(1), arm))
+            order.append(own)
+        first += len(numbers)
+    return blocks, np.argsort(np.concatenate(order))
+
+
+def _blocks(
+    component: Component, at: str, points: int, surface: float, normal: FloatArray
 ) -> tuple[list[Block], str]:
     model = component.model
     blocks = []
     for kind, facets in model.facets_on(at).items():
         blocks.append(_facet_block(component, at, kind, facets, points, normal))
-    measure = "length" if model.is_plane else "area"
+    measure = "length" if model.plane else "area"
     beams = list(_beam_blocks(component, at, points, surface * normal))
     if blocks and beams:
         raise ModelError(f"{model.mesh.source}: contact at {at!r}: has both facets and beams")
@@ -405,7 +336,7 @@ def _structure_blocks(
 
 
 def _facet_block(
-    component: StructureComponent,
+    component: Component,
     at: str,
     kind: str,
     facets: IntArray,
@@ -435,25 +366,42 @@ def _facet_block(
     )
 
 
-def _beam_blocks(
-    component: StructureComponent, at: str, points: int, arm: FloatArray
-) -> Iterator[Block]:
-    model = component.model
-    inside = np.zeros(len(model.mesh.points), dtype=np.bool_)
-    inside[model.mesh.nodes(at)] = True
+def _beam_blocks(component: Component, at: str, points: int, arm: FloatArray) -> Iterator[Block]:
     s, weights = gauss(points)
-    for name, (part, lines) in model.beams.items():
-        on = inside[lines].all(axis=1)
-        if not on.any():
-            continue
-        ends = model.mesh.points[lines[on]]
-        what = f"{model.mesh.source}: part {name!r}"
-        lengths, moves, turns = beam_motions(part, ends[:, 1] - ends[:, 0], what, s)
-        lever = np.array([np.cross(axis, arm) for axis in np.eye(3)])
-        shapes = moves + np.einsum("ji,eqja->eqia", lever, turns)
-        places = (1.0 - s)[:, None] * ends[:, None, 0] + s[:, None] * ends[:, None, 1]
-        dofs = beam_dofs(model, component.numbering, name)[on]
-        yield places + arm, weights * lengths[:, None], shapes, dofs
+    for name, _, numbers in _beams_in(component, at):
+        yield _beam_block(component, name, numbers, s, weights, arm)
+
+
+def _beams_in(component: Component, at: str) -> Iterator[tuple[str, IntArray, IntArray]]:
+    """Names of beams, those of their lines (e, 2) whose nodes are in a set, and their numbers."""
+    inside = np.zeros(len(component.model.mesh.points), dtype=np.bool_)
+    inside[component.model.mesh.nodes(at)] = True
+    for name, (_, lines) in component.model.beams.items():
+        numbers = np.flatnonzero(inside[lines].all(axis=1))
+        if len(numbers):
+            yield name, lines[numbers], numbers
+
+
+def _beam_block(
+    component: Component,
+    name: str,
+    numbers: IntArray,
+    s: FloatArray,
+    weights: FloatArray,
+    arm: FloatArray,
+) -> Block:
+    """Places (q,) or (e, q) from 0 to 1 on lines (e,) of a beam, an arm off its axis."""
+    model = component.model
+    part, lines = model.beams[name]
+    ends = model.mesh.points[lines[numbers]]
+    what = f"{model.mesh.source}: part {name!r}"
+    lengths, moves, turns = beam_motions(part, ends[:, 1] - ends[:, 0], what, s)
+    lever = np.array([np.cross(axis, arm) for axis in np.eye(3)])
+    shapes = moves + np.einsum("ji,eqja->eqia", lever, turns)
+    share = np.broadcast_to(s, (len(ends), s.shape[-1]))[..., None]
+    places = (1.0 - share) * ends[:, None, 0] + share * ends[:, None, 1]
+    dofs = beam_dofs(model, component.numbering, name)[numbers]
+    return places + arm, weights * lengths[:, None], shapes, dofs
 
 
 def gauss(points: int) -> tuple[FloatArray, FloatArray]:

@@ -43,7 +43,7 @@ class InertiaLoads:
         name
             Of the load vector.
         acceleration
-            Components (x, y, z) in m/s², z being 0 in a plane frame; a load is a factor of it.
+            Components (x, y, z) in m/s², z being 0 in the plane; a load is a factor of it.
 
         Raises
         ------
@@ -106,7 +106,7 @@ def inertia_load(
     along = np.zeros(3)
     along[: len(acceleration)] = acceleration
     if np.any(along[axes:]):
-        raise ModelError("a plane frame cannot be accelerated along z, out of its plane")
+        raise ModelError("a structure in the plane cannot be accelerated along z, out of its plane")
     vector = inertia @ along[:axes]
     if not np.any(vector):
         raise ModelError(f"nothing moves along the acceleration {along.tolist()}")

@@ -7,16 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.assembly.frame import Component
-from fem.assembly.structure import StructureComponent
+from fem.assembly.component import Component
 from fem.base.arrays import FloatArray, IntArray
 from fem.elements.tapers import along
 from fem.mesh.cells import measures
-from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.pieces import described, place_of
 from fem.mesh.structure_mesh import StructureMesh
-from fem.model.frame import FrameModel
-from fem.model.parts import BeamPart, TrussPart
+from fem.model.parts import BeamPart
 from fem.model.structure import StructureModel
 
 MOST_NAMES = 30
@@ -47,7 +44,7 @@ class MassProperties:
     centre: tuple[float, float, float]
 
 
-def mass_properties(component: Component | StructureComponent) -> MassProperties:
+def mass_properties(component: Component) -> MassProperties:
     """Mass and centre of mass of everything that a component is made of, supports apart.
 
     Notes
@@ -57,15 +54,12 @@ def mass_properties(component: Component | StructureComponent) -> MassProperties
     """
     rigid = component.rigid_mass
     mass = rigid[0, 0]
-    if isinstance(component, Component):
-        moments = np.array([rigid[1, 2], -rigid[0, 2], mass * component.model.mesh.points[0, 2]])
-    else:
-        moments = np.array([rigid[1, 5], -rigid[0, 5], rigid[0, 4]])
+    moments = np.array([rigid[1, 5], -rigid[0, 5], rigid[0, 4]])
     x, y, z = (float(f"{value:.12g}") + 0.0 for value in (moments / mass if mass else np.zeros(3)))
     return MassProperties(float(f"{mass:.12g}"), (x, y, z))
 
 
-def volume(model: FrameModel | StructureModel) -> float:
+def volume(model: StructureModel) -> float:
     """Volume in m³ of everything that a model is made of, hinges and masses at points apart.
 
     Examples
@@ -73,23 +67,17 @@ def volume(model: FrameModel | StructureModel) -> float:
     >>> import fem
     >>> rod = fem.BeamPart(fem.Material(2.1e11, 7800.0), fem.RectangularSection(0.1, 0.02))
     >>> mesh = fem.frame_mesh({"a": (0, 0), "b": (3, 0)}, [("rod", "a", "b", 2)])
-    >>> round(volume(fem.FrameModel(mesh, {"rod": rod})), 12)
+    >>> round(volume(fem.StructureModel(mesh, {"rod": rod})), 12)
     0.006
     """
     mesh, found = model.mesh, 0.0
-    lines: dict[str, tuple[BeamPart | TrussPart, IntArray]] = {}
-    if isinstance(model, FrameModel):
-        for name, part in model.parts.items():
-            lines[name] = part, model.mesh.lines[model.mesh.part(name)]
-    else:
-        lines.update(model.beams)
-        for solid, kinds in model.solids.values():
-            found += (solid.thickness or 1.0) * _size(mesh.points, kinds)
-        for shell, kinds in model.shells.values():
-            found += shell.thickness * _size(mesh.points, kinds)
-        for truss, kinds in model.trusses.values():
-            found += truss.area * _size(mesh.points, kinds)
-    for name, (part, ends) in lines.items():
+    for solid, kinds in model.solids.values():
+        found += (solid.thickness or 1.0) * _size(mesh.points, kinds)
+    for shell, kinds in model.shells.values():
+        found += shell.thickness * _size(mesh.points, kinds)
+    for truss, kinds in model.trusses.values():
+        found += truss.area * _size(mesh.points, kinds)
+    for name, (part, ends) in model.beams.items():
         lengths = np.linalg.norm(mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]], axis=1)
         found += float(np.sum(lengths * _mean_area(part, mesh, ends, name)))
     return found
@@ -99,18 +87,14 @@ def _size(points: FloatArray, kinds: Mapping[str, IntArray]) -> float:
     return sum(float(measures(kind, points[cells]).sum()) for kind, cells in kinds.items())
 
 
-def _mean_area(
-    part: BeamPart | TrussPart, mesh: FrameMesh | StructureMesh, ends: IntArray, name: str
-) -> FloatArray:
+def _mean_area(part: BeamPart, mesh: StructureMesh, ends: IntArray, name: str) -> FloatArray:
     """Of each line, in m², by Simpson's rule, which is exact where lengths change linearly."""
-    if isinstance(part, TrussPart):
-        return np.full(len(ends), part.area)
     section = along(part, mesh, ends, name, np.array([0.0, 0.5, 1.0])).section
     areas = np.broadcast_to(np.asarray(section.area), (len(ends), 3))
     return areas @ [1 / 6, 4 / 6, 1 / 6]
 
 
-def summary(component: Component | StructureComponent) -> str:
+def summary(component: Component) -> str:
     """What a component was made of, in lines for a person.
 
     Examples
@@ -126,14 +110,15 @@ def summary(component: Component | StructureComponent) -> str:
     used = mesh.points
     low, high = used.min(axis=0), used.max(axis=0)
     properties = mass_properties(component)
+    cells = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in mesh.cells.items())
     lines = [
-        f"mesh {mesh.source}: {len(mesh.points)} nodes; {_cells(component)}",
+        f"mesh {mesh.source}: {len(mesh.points)} nodes; {cells}",
         f"extents: {place_of(low)} to {place_of(high)} m",
         f"volume: {volume(component.model):.8g} m³",
         f"mass: {properties.mass:.8g} kg, centre at {place_of(np.array(properties.centre))} m",
         *_names(component),
         *described(component.model),
-        *getattr(mesh, "notes", ()),
+        *mesh.notes,
         *(f"left out of the file: {item}" for item in mesh.left_out),
     ]
     if mesh.attachments:
@@ -141,24 +126,13 @@ def summary(component: Component | StructureComponent) -> str:
     return "\n".join(lines)
 
 
-def _cells(component: Component | StructureComponent) -> str:
-    """Cells by kind."""
-    if isinstance(component, Component):
-        return f"{len(component.model.mesh.lines)} line"
-    cells = component.model.mesh.cells
-    return ", ".join(f"{len(nodes)} {kind}" for kind, nodes in cells.items())
-
-
-def _names(component: Component | StructureComponent) -> list[str]:
+def _names(component: Component) -> list[str]:
     """Groups of cells and sets of points, each with how much it holds."""
     mesh = component.model.mesh
-    if isinstance(component, Component):
-        groups = {name: f"{len(cells)} line" for name, cells in component.model.mesh.parts.items()}
-    else:
-        groups = {
-            name: ", ".join(f"{len(at)} {kind}" for kind, at in found.items())
-            for name, found in component.model.mesh.groups.items()
-        }
+    groups = {
+        name: ", ".join(f"{len(at)} {kind}" for kind, at in found.items())
+        for name, found in mesh.groups.items()
+    }
     parts = set(component.model.parts)
     told = [
         f"{name!r} ({what}{', a part' if name in parts else ''})" for name, what in groups.items()

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy import sparse
 
 from fem.assembly.constraints import Numbering
 from fem.base.arrays import IntArray
 from fem.elements.natural import Rows, node_rows
-from fem.elements.scatter import SparseArray, added, dense_scatter
+from fem.elements.scatter import SparseArray, dense_scatter
 from fem.elements.trusses import truss_mass, truss_rows
 from fem.mesh.cells import KINDS, CellKind
 from fem.model.parts import TrussPart
@@ -27,7 +26,7 @@ def truss_pieces(model: StructureModel) -> Iterator[tuple[TrussPart, CellKind, I
 def truss_matrices(model: StructureModel, numbering: Numbering) -> tuple[SparseArray, SparseArray]:
     """Stiffness and mass of all trusses, for all degrees of freedom."""
     size = 3 * numbering.count
-    stiffness, mass = sparse.csr_array((size, size)), sparse.csr_array((size, size))
+    stiffness, mass = [], []
     for part, kind, nodes, what in truss_pieces(model):
         coordinates = model.mesh.points[nodes]
         rows, weights = truss_rows(part, kind, coordinates, what)
@@ -36,9 +35,9 @@ def truss_matrices(model: StructureModel, numbering: Numbering) -> tuple[SparseA
         M = truss_mass(part, kind, coordinates, what)
         M = np.einsum("eab,ij->eaibj", M, np.eye(3)).reshape(K.shape)
         dofs = numbering.dofs(nodes)[..., :3].reshape(len(nodes), -1)
-        stiffness = added(stiffness, dense_scatter(K, dofs, size))
-        mass = added(mass, dense_scatter(M, dofs, size))
-    return stiffness, mass
+        stiffness.append((K, dofs))
+        mass.append((M, dofs))
+    return dense_scatter(stiffness, size), dense_scatter(mass, size)
 
 
 def truss_form(model: StructureModel, numbering: Numbering) -> Iterator[Rows]:

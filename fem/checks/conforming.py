@@ -49,7 +49,7 @@ def _mismatches(model: StructureModel) -> Iterator[Mismatch]:
         by_corners.setdefault(len(KINDS[kind].corners), []).append((kind, nodes))
     for of_one_shape in by_corners.values():
         yield from _of_other_nodes(of_one_shape)
-    if not model.is_plane:
+    if not model.plane:
         yield from _cut_in_two(model.facets)
 
 

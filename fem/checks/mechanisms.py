@@ -95,7 +95,7 @@ def beams_that_turn(model: StructureModel) -> Iterator[tuple[list[str], str]]:
     >>> import fem
     >>> steel = fem.Material(2.1e11, 7800.0, 0.3)
     >>> block = fem.box_mesh("block", (1.0, 1.0), (1, 1), kind="quad")
-    >>> rod = fem.structure_mesh(fem.frame_mesh({"a": (1, 0), "b": (2, 0)}, [("rod", "a", "b", 1)]))
+    >>> rod = fem.frame_mesh({"a": (1, 0), "b": (2, 0)}, [("rod", "a", "b", 1)])
     >>> model = fem.StructureModel(
     ...     fem.joined([block, rod]),
     ...     {
@@ -120,7 +120,7 @@ def beams_that_turn(model: StructureModel) -> Iterator[tuple[list[str], str]]:
         pinned[model.mesh.node(coupling.point)] = False
         if coupling.kind == "rigid" and len(coupling.directions) == 3:
             pinned[model.mesh.nodes(coupling.face)] = False
-    turns = {"rotation_z"} if model.is_plane else {f"rotation_{axis}" for axis in "xyz"}
+    turns = {"rotation_z"} if model.plane else {f"rotation_{axis}" for axis in "xyz"}
     for support in model.attached.supports:
         if turns <= {AXES[axis_index(direction)] for direction in support.directions}:
             pinned[model.mesh.nodes(support.point)] = False
@@ -192,7 +192,7 @@ def _on_axes(model: StructureModel, pairs: IntArray) -> IntArray:
     for nodes in shared.values():
         spans = model.mesh.points[nodes] - model.mesh.points[nodes[0]]
         rank = np.linalg.matrix_rank(spans, tol=ALIGNED * model.mesh.size)
-        if rank < (1 if model.is_plane else 2):
+        if rank < (1 if model.plane else 2):
             found.update(nodes)
     return np.array(sorted(found), dtype=np.int64)
 
@@ -260,5 +260,5 @@ def mechanism_warnings(model: StructureModel) -> Iterator[str]:
     for name in brought.loose:
         held[model.mesh.nodes(name)] = 1
     trusses = [nodes for _, kinds in model.trusses.values() for nodes in kinds.values()]
-    dimension = 2 if model.is_plane else 3
+    dimension = 2 if model.plane else 3
     yield from loose_sentences(model.mesh, loose_nodes(model.mesh.points, trusses, held, dimension))

@@ -12,8 +12,6 @@ from fem.base.errors import ModelError
 from fem.elements.tapers import along
 from fem.mesh.cells import measures
 from fem.mesh.pieces import place_of
-from fem.model.frame import FrameModel
-from fem.model.parts import BeamPart
 from fem.model.structure import StructureModel
 
 THICK = 0.5
@@ -26,7 +24,7 @@ class UnlikelyWarning(UserWarning):
     """A mass or a cell that is there twice, a shell as thick as wide, a beam as thick as long."""
 
 
-def check_masses_carried(model: FrameModel | StructureModel) -> None:
+def check_masses_carried(model: StructureModel) -> None:
     """Refuse point masses at nodes that no part, link, coupling, equation or spring holds.
 
     Raises
@@ -51,7 +49,7 @@ def check_masses_carried(model: FrameModel | StructureModel) -> None:
             )
 
 
-def unlikely(model: FrameModel | StructureModel) -> Iterator[str]:
+def unlikely(model: StructureModel) -> Iterator[str]:
     """A sentence for whatever is possible but looks like a mistake."""
     mesh = model.mesh
     heavy = [lump for lump in model.attached.point_masses if lump.mass > 0.0]
@@ -75,30 +73,29 @@ def unlikely(model: FrameModel | StructureModel) -> Iterator[str]:
             )
 
 
-def _upon_each_other(model: FrameModel | StructureModel) -> Iterator[tuple[int, int, str]]:
+def _upon_each_other(model: StructureModel) -> Iterator[tuple[int, int, str]]:
     """How many beams and facets of shells leave a node or an edge as another does; a node; what.
 
     Of parts without an offset. Beams that leave one node in one direction lie upon each other, and
     so do flat facets that leave an edge inwards in one direction.
     """
     points = model.mesh.points
-    beams = list(_beams(model).values())
+    beams = model.beams.values()
     lines = [ends for part, ends in beams if not any(part.offset) and part.end_offsets is None]
     if lines:
         ends = np.concatenate(lines)
         ends = np.concatenate([ends, ends[:, ::-1]])
         yield *_alike(ends[:, :1], points[ends[:, 1]] - points[ends[:, 0]]), "beams"
-    if isinstance(model, StructureModel):
-        edges, inwards = [np.empty((0, 2), dtype=np.int64)], [np.empty((0, 3))]
-        for shell, kinds in model.shells.values():
-            for nodes in kinds.values() if not shell.offset else ():
-                pairs = np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=2)
-                centre = points[nodes].mean(axis=1)[:, None] - points[pairs[..., 0]]
-                along = points[pairs[..., 1]] - points[pairs[..., 0]]
-                part = (centre * along).sum(axis=2) / (along**2).sum(axis=2)
-                inwards.append((centre - part[..., None] * along).reshape(-1, 3))
-                edges.append(np.sort(pairs.reshape(-1, 2), axis=1))
-        yield *_alike(np.concatenate(edges), np.concatenate(inwards)), "facets of shells"
+    edges, inwards = [np.empty((0, 2), dtype=np.int64)], [np.empty((0, 3))]
+    for shell, kinds in model.shells.values():
+        for nodes in kinds.values() if not shell.offset else ():
+            pairs = np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=2)
+            centre = points[nodes].mean(axis=1)[:, None] - points[pairs[..., 0]]
+            along = points[pairs[..., 1]] - points[pairs[..., 0]]
+            part = (centre * along).sum(axis=2) / (along**2).sum(axis=2)
+            inwards.append((centre - part[..., None] * along).reshape(-1, 3))
+            edges.append(np.sort(pairs.reshape(-1, 2), axis=1))
+    yield *_alike(np.concatenate(edges), np.concatenate(inwards)), "facets of shells"
 
 
 def _alike(nodes: IntArray, directions: FloatArray) -> tuple[int, int]:
@@ -112,27 +109,15 @@ def _alike(nodes: IntArray, directions: FloatArray) -> tuple[int, int]:
     return len(again), int(nodes[again[0], 0]) if len(again) else -1
 
 
-def _proportions(model: FrameModel | StructureModel) -> Iterator[tuple[str, float, float, str]]:
+def _proportions(model: StructureModel) -> Iterator[tuple[str, float, float, str]]:
     """Thickness of shells, or side of a square of a beam's area; what to compare it with; words."""
     points = model.mesh.points
-    if isinstance(model, StructureModel):
-        for name, (shell, facets) in model.shells.items():
-            area = sum(float(measures(kind, points[nodes]).sum()) for kind, nodes in facets.items())
-            yield name, shell.thickness, float(np.sqrt(area)), "as large as a square of"
-    for name, (beam, ends) in _beams(model).items():
+    for name, (shell, facets) in model.shells.items():
+        area = sum(float(measures(kind, points[nodes]).sum()) for kind, nodes in facets.items())
+        yield name, shell.thickness, float(np.sqrt(area)), "as large as a square of"
+    for name, (beam, ends) in model.beams.items():
         area = np.max(along(beam, model.mesh, ends, f"part {name!r}").section.area)
         yield name, float(np.sqrt(area)), _length(points, ends), "in all as long as"
-
-
-def _beams(model: FrameModel | StructureModel) -> dict[str, tuple[BeamPart, IntArray]]:
-    """Parts of beams, with the nodes of their lines."""
-    if isinstance(model, StructureModel):
-        return model.beams
-    return {
-        name: (part, model.mesh.lines[elements])
-        for name, elements in model.element_parts().items()
-        if isinstance(part := model.parts[name], BeamPart)
-    }
 
 
 def _length(points: FloatArray, ends: IntArray) -> float:

@@ -1,4 +1,4 @@
-"""Beams: from material and section to the matrices of elements in the plane and in space."""
+"""Beams: from material and section to the matrices of elements."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from fem.elements.straight_beams import (
     mean,
     stretching_matrices,
 )
-from fem.elements.trusses import plane_truss_matrices
-from fem.model.parts import BeamPart, TrussPart
+from fem.model.parts import BeamPart
 from fem.model.sections import (
     CircularSection,
     SectionRun,
@@ -95,78 +94,55 @@ def shear_modulus(part: BeamPart, what: str) -> float:
     return part.material.youngs_modulus / (2.0 * (1.0 + part.material.poissons_ratio_for(what)))
 
 
-def plane_matrices(
-    part: BeamPart | TrussPart, lengths: FloatArray, what: str
-) -> tuple[FloatArray, FloatArray]:
-    """Stiffness and mass (e, 6, 6) along the axis, for (u, w, rotation) at both ends."""
-    if isinstance(part, TrussPart):
-        return plane_truss_matrices(part, lengths)
-    pairs = _stretching(part, lengths), _bending(part, lengths, plane_bending(part, what))
-    return _composed(6, [(np.array([0, 3]), pairs[0]), (np.array([1, 2, 4, 5]), pairs[1])])
-
-
 def spatial_matrices(
-    part: BeamPart, lengths: FloatArray, what: str
+    part: BeamPart, lengths: FloatArray, what: str, plane: bool = False
 ) -> tuple[FloatArray, FloatArray]:
-    """Stiffness and mass (e, 12, 12) in local axes.
+    """Stiffness and mass (e, 12, 12) in local axes; in the plane of the height alone if asked so.
 
     The degrees of freedom are (u, v, w) and the rotations about x, y and z at the first end, then
     at the second; x runs along the beam, y along the height of the section and z along its width.
     Torsion is Saint-Venant's: GJ, and rho (Iy + Iz) with the section's added inertia; warping is
     free.
     """
+    upright = _bending(part, lengths, plane_bending(part, what))
+    pieces = [(np.array([0, 6]), _stretching(part, lengths)), (IN_PLANE, upright)]
+    if plane:
+        return _composed(12, pieces)
     across = _bending(part, lengths, across_bending(part, what))
     signs = TURNED_SIGNS[:, None] * TURNED_SIGNS
     material, section = part.material, part.section
     torsion = shear_modulus(part, what) * section_number(section, "torsion_constant", what)
     polar = section.second_moment + section_number(section, "second_moment_across", what)
     inertia = material.density * polar + added(section, "added_inertia")
-    return _composed(
-        12,
-        [
-            (np.array([0, 6]), _stretching(part, lengths)),
-            (IN_PLANE, _bending(part, lengths, plane_bending(part, what))),
-            (OUT_OF_PLANE, (across[0] * signs, across[1] * signs)),
-            (
-                np.array([3, 9]),
-                stretching_matrices(lengths, each(torsion, lengths), each(inertia, lengths)),
-            ),
-        ],
-    )
+    twisting = stretching_matrices(lengths, each(torsion, lengths), each(inertia, lengths))
+    bending = across[0] * signs, across[1] * signs
+    return _composed(12, [*pieces, (OUT_OF_PLANE, bending), (np.array([3, 9]), twisting)])
 
 
-def plane_rows(
-    part: BeamPart | TrussPart, lengths: FloatArray, what: str
+def spatial_rows(
+    part: BeamPart, lengths: FloatArray, what: str, plane: bool = False
 ) -> tuple[FloatArray, FloatArray]:
-    """Rows (e, 4, 4) of the natural form and their stiffness (e, 4), see `natural.line_rows`.
+    """Rows (e, 8, 9) of the natural form and their stiffness (e, 8), see `natural.line_rows`.
 
-    Along the axis, for (u2 - u1, w2 - w1) and the rotations of both ends.
+    In local axes, for (u, v, w)2 - (u, v, w)1 and six rotations. In the plane of the height alone
+    they are (e, 4, 9) and (e, 4).
     """
-    if isinstance(part, TrussPart):
-        only = np.zeros((len(lengths), 4))
-        only[:, 0] = part.material.youngs_modulus * part.area / lengths
-        return np.tile(np.diag([1.0, 0.0, 0.0, 0.0]), (len(lengths), 1, 1)), only
-    bending, stiffness = bending_rows(plane_bending(part, what), lengths, part.axial_force)
     stretching = part.material.youngs_modulus * mean(each(part.section.area, lengths)) / lengths
-    rows = np.zeros((len(lengths), 4, 4))
-    rows[:, 0, 0] = 1.0
-    rows[:, 1:, 1:] = bending
-    return rows, np.column_stack([stretching, stiffness])
-
-
-def spatial_rows(part: BeamPart, lengths: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
-    """The same in space, (e, 8, 9) and (e, 8), for (u, v, w)2 - (u, v, w)1 and six rotations."""
+    bending, first = bending_rows(plane_bending(part, what), lengths, part.axial_force)
+    upright = np.zeros((len(lengths), 4, 9))
+    upright[:, 0, 0] = 1.0
+    upright[:, 1:, [1, 5, 8]] = bending
+    stiffness = np.column_stack([stretching, first])
+    if plane:
+        return upright, stiffness
     constant = section_number(part.section, "torsion_constant", what)
     torsion = shear_modulus(part, what) * mean(each(constant, lengths))
-    stretching = part.material.youngs_modulus * mean(each(part.section.area, lengths))
-    upright, first = bending_rows(plane_bending(part, what), lengths, part.axial_force)
     across, second = bending_rows(across_bending(part, what), lengths, part.axial_force)
-    rows = np.zeros((len(lengths), 8, 9))
-    rows[:, 0, 0] = 1.0
-    rows[:, 1, [3, 6]] = -1.0, 1.0
-    rows[:, 2:5, [1, 5, 8]] = upright
-    rows[:, 5:, [2, 4, 7]] = across * np.array([1.0, -1.0, -1.0])
-    return rows, np.column_stack([stretching / lengths, torsion / lengths, first, second])
+    rows = np.zeros((len(lengths), 4, 9))
+    rows[:, 0, [3, 6]] = -1.0, 1.0
+    rows[:, 1:, [2, 4, 7]] = across * np.array([1.0, -1.0, -1.0])
+    weights = np.column_stack([stiffness, torsion / lengths, second])
+    return np.concatenate([upright, rows], axis=1), weights
 
 
 def bending_rows(
@@ -301,7 +277,7 @@ def to_nodes(part: BeamPart, axes: FloatArray) -> FloatArray:
 
 
 def hermite(s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Hermite's four cubics at places (q,) on [0, 1], and their slopes, each (4, q).
+    """Hermite's four cubics at places (..., q) on [0, 1], and their slopes, each (4, ..., q).
 
     Those of rotations are to be multiplied by the length.
     """
@@ -370,14 +346,15 @@ def to_neutral_axis(part: BeamPart, all_directions: bool) -> FloatArray:
 
 
 def local_rows(
-    part: BeamPart, spans: FloatArray, what: str
+    part: BeamPart, spans: FloatArray, what: str, plane: bool = False
 ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-    """Rows (e, 8, 12) for both ends in local axes, stiffness (e, 8), and what releases leave.
+    """Rows (e, r, 12) for both ends in local axes, stiffness (e, r), and what releases leave.
 
     The last are the matrices (e, 12, 12) of `without_released`, which the rows hold already.
     """
-    relative, stiffness = spatial_rows(part, np.linalg.norm(run(part, spans, what), axis=1), what)
-    rows = np.zeros((len(spans), 8, 12))
+    lengths = np.linalg.norm(run(part, spans, what), axis=1)
+    relative, stiffness = spatial_rows(part, lengths, what, plane)
+    rows = np.zeros((*stiffness.shape, 12))
     rows[:, :, :3], rows[:, :, 6:9] = -relative[:, :, :3], relative[:, :, :3]
     rows[:, :, 3:6], rows[:, :, 9:] = relative[:, :, 3:6], relative[:, :, 6:]
     if any(part.neutral_axis):
@@ -389,9 +366,19 @@ def local_rows(
     return rows @ left, stiffness, left
 
 
-def element_rows(part: BeamPart, spans: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
-    """Rows (e, 8, 9) of the natural form for the nodes' displacements, and stiffness (e, 8)."""
-    rows, stiffness, _ = local_rows(part, spans, what)
+def in_plane(part: BeamPart, plane: bool) -> bool:
+    """Whether a beam of a plane structure bends along its height alone: no orientation turns it."""
+    return plane and part.orientation is None
+
+
+def element_rows(
+    part: BeamPart, spans: FloatArray, what: str, plane: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """Rows (e, r, 9) of the natural form for the nodes' displacements, and stiffness (e, r).
+
+    There are 8 rows, or 4 of a beam that bends in the x-y plane only.
+    """
+    rows, stiffness, _ = local_rows(part, spans, what, in_plane(part, plane))
     T = to_nodes(part, local_axes(part, spans, what))
     # that all nodes move alike deforms nothing: only their difference counts
     relative = np.zeros((len(spans), 12, 9))
@@ -400,18 +387,24 @@ def element_rows(part: BeamPart, spans: FloatArray, what: str) -> tuple[FloatArr
     return rows @ relative, stiffness
 
 
-def element_matrices(part: BeamPart, spans: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
-    """Stiffness and mass (e, 12, 12) of beams in space for their nodes' displacements."""
+def element_matrices(
+    part: BeamPart, spans: FloatArray, what: str, plane: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """Stiffness and mass (e, 12, 12) of beams for their nodes' displacements.
+
+    In the x-y plane what a beam needs to bend out of it, or to twist, may be unknown.
+    """
     T = to_nodes(part, local_axes(part, spans, what))
     lengths = np.linalg.norm(run(part, spans, what), axis=1)
-    stiffness, mass = spatial_matrices(part, lengths, what)
+    plane = in_plane(part, plane)
+    stiffness, mass = spatial_matrices(part, lengths, what, plane)
     if any(part.neutral_axis):
         stiff, heavy = (to_neutral_axis(part, every) for every in (False, True))
         count = (len(spans), 12, 12)
         stiffness = congruent(stiffness, np.broadcast_to(stiff, count))
         mass = congruent(mass, np.broadcast_to(heavy, count))
     if part.released is not None:
-        left = local_rows(part, spans, what)[2]
+        left = local_rows(part, spans, what, plane)[2]
         assert left is not None
         T = left @ T
     return congruent(stiffness, T), congruent(mass, T)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -71,11 +72,14 @@ def block_pattern(cells: list[IntArray], count: int) -> BlockPattern:
     return BlockPattern(indptr, (used % count).astype(index), places)
 
 
-def dense_scatter(matrices: FloatArray, dofs: IntArray, count: int) -> SparseArray:
-    """Sum of matrices (e, m, m) at the degrees of freedom (e, m), shape (count, count)."""
-    rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
-    columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
-    full = sparse.coo_array((matrices.ravel(), (rows, columns)), shape=(count, count))
+def dense_scatter(pieces: Iterable[tuple[FloatArray, IntArray]], count: int) -> SparseArray:
+    """Sum of matrices (e, m, m) at degrees of freedom (e, m), of all pieces, (count, count)."""
+    entries = [(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64))]
+    for matrices, dofs in pieces:
+        cell, row, column = np.nonzero(matrices)
+        entries.append((matrices[cell, row, column], dofs[cell, row], dofs[cell, column]))
+    values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
+    full = sparse.coo_array((values, (rows, columns)), shape=(count, count))
     return sparse.csr_array(full.tocsr())
 
 
@@ -88,6 +92,8 @@ def added(first: SparseArray, second: SparseArray) -> SparseArray:
 
 def squares(rows: SparseArray, weights: FloatArray) -> SparseArray:
     """The sparse matrix BᵀwB."""
+    if not len(weights):
+        return sparse.csr_array((rows.shape[1], rows.shape[1]))
     return sparse.csr_array(rows.T @ sparse.diags_array(weights) @ rows)
 
 

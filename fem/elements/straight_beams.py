@@ -209,36 +209,6 @@ def congruent(matrices: FloatArray, T: FloatArray) -> FloatArray:
     return np.asarray((turned + turned.transpose(0, 2, 1)) / 2.0, dtype=np.float64)
 
 
-def turn(matrices: FloatArray, directions: FloatArray) -> FloatArray:
-    """Element matrices TᵀkT in the directions of the frame.
-
-    Parameters
-    ----------
-    matrices
-        Along the elements' own axes, shape (e, 6, 6).
-    directions
-        Unit vectors (cos, sin) along the elements, shape (e, 2).
-
-    Returns
-    -------
-    ndarray
-        Shape (e, 6, 6), for (ux, uy, rotation) of the first end, then the second; symmetric.
-    """
-    return congruent(matrices, rotations(directions))
-
-
-def rotations(directions: FloatArray) -> FloatArray:
-    """The matrices T, shape (e, 6, 6), from (ux, uy, rotation) to (u, w, rotation) at both ends."""
-    c, s = directions.T
-    T = np.zeros((len(directions), 6, 6))
-    for first in (0, 3):
-        T[:, first, first] = T[:, first + 1, first + 1] = c
-        T[:, first, first + 1] = s
-        T[:, first + 1, first] = -s
-        T[:, first + 2, first + 2] = 1.0
-    return T
-
-
 def _disconnected_lines(lengths: FloatArray) -> skfem.MeshLine:
     count = len(lengths)
     ends = np.zeros((1, 2 * count))

@@ -10,7 +10,6 @@ import numpy as np
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
 from fem.elements.straight_beams import PLACES
-from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.structure_mesh import StructureMesh
 from fem.model.parts import TrussPart
 from fem.model.sections import LinearSection, SectionRun, TaperedSection
@@ -21,7 +20,7 @@ BEYOND = 1e-6
 
 def along(
     part: Any,
-    mesh: FrameMesh | StructureMesh,
+    mesh: StructureMesh,
     lines: IntArray,
     what: str,
     places: FloatArray = PLACES,
@@ -58,7 +57,7 @@ def along(
 
 
 def taper_shares(
-    section: TaperedSection, mesh: FrameMesh | StructureMesh, lines: IntArray, what: str
+    section: TaperedSection, mesh: StructureMesh, lines: IntArray, what: str
 ) -> FloatArray:
     """Shares of the way from the start to the end of a taper at both ends of lines, (e, 2).
 
@@ -68,7 +67,7 @@ def taper_shares(
     >>> ends = {"a": (0, 0), "b": (2, 0)}
     >>> mesh = fem.frame_mesh(ends, [("arm", "a", "b", 2)])
     >>> round_bar = fem.CircularSection(0.2), fem.CircularSection(0.1)
-    >>> taper_shares(fem.TaperedSection(*round_bar, "a", "b"), mesh, mesh.lines, "arm")
+    >>> taper_shares(fem.TaperedSection(*round_bar, "a", "b"), mesh, mesh.cells["line"], "arm")
     array([[0. , 0.5],
            [0.5, 1. ]])
     """

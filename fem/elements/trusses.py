@@ -9,7 +9,6 @@ import numpy as np
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError, quoted
 from fem.mesh.cells import SPANS, CellKind
-from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.structure_mesh import StructureMesh
 from fem.model.parts import TrussPart
 
@@ -58,27 +57,6 @@ def _along(
         raise ModelError(f"{what}: line {bad[0]} has no length or doubles back on itself")
     run = np.einsum("ebi,qb->eqi", coordinates, slopes[..., 0])
     return slopes[..., 0], np.linalg.norm(run, axis=2), weights, values
-
-
-def plane_truss_matrices(part: TrussPart, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Stiffness and mass (e, 6, 6) along the axis, for (u, w, rotation) at both ends.
-
-    Examples
-    --------
-    >>> from fem.model.parts import Material
-    >>> part = TrussPart(Material(2.0, 6.0), 1.0)
-    >>> plane_truss_matrices(part, np.ones(1))[1][0, [0, 0, 1], [0, 3, 4]]
-    array([2., 1., 1.])
-    """
-    K, M = np.zeros((len(lengths), 6, 6)), np.zeros((len(lengths), 6, 6))
-    K[:, 0, 0] = K[:, 3, 3] = part.material.youngs_modulus * part.area / lengths
-    K[:, 0, 3] = K[:, 3, 0] = -K[:, 0, 0]
-    for axis in (0, 1):
-        M[:, axis, axis] = M[:, axis + 3, axis + 3] = (
-            part.material.density * part.area * lengths / 3.0
-        )
-        M[:, axis, axis + 3] = M[:, axis + 3, axis] = M[:, axis, axis] / 2.0
-    return K, M
 
 
 def loose_nodes(
@@ -130,7 +108,7 @@ def chords(cells: IntArray) -> IntArray:
     return np.concatenate([cells[:, list(ends)] for ends in SPANS[kind]])
 
 
-def loose_sentences(mesh: FrameMesh | StructureMesh, nodes: IntArray) -> Iterator[str]:
+def loose_sentences(mesh: StructureMesh, nodes: IntArray) -> Iterator[str]:
     """One sentence that names the nodes of a mesh that nothing holds in all directions."""
     if len(nodes):
         listed = ", ".join(str(node) for node in nodes[:5]) + (", ..." if len(nodes) > 5 else "")

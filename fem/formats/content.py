@@ -1,4 +1,4 @@
-"""What a mesh file holds, before a mesh of a frame or a structure is made of it."""
+"""What a mesh file holds, before a mesh is made of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Meshes of frames and structures from those of files and of meshio."""
+"""Meshes from those of files and of meshio."""
 
 from __future__ import annotations
 
@@ -13,49 +13,17 @@ from fem.base.errors import ModelError, quoted
 from fem.formats.collapsed import uncollapsed
 from fem.formats.content import MeshLike, dimension_of
 from fem.formats.ignored import SET_PREFIX, TYPE_PREFIX
-from fem.mesh.cells import KINDS, SPANS
-from fem.mesh.frame_mesh import FrameMesh
+from fem.mesh.cells import KINDS
 from fem.mesh.structure_mesh import StructureMesh
 
 Named = TypeVar("Named")
 FARTHEST = 1e50
-ASIDE = 1e-6  # of its length: how far the middle node of a straight line may lie beside it
 
 
-def from_meshio(content: MeshLike, source: str = "meshio mesh") -> FrameMesh:
-    """Take lines, parts and points out of a `meshio.Mesh`; see `read_mesh` for the conventions.
-
-    Examples
-    --------
-    >>> import meshio
-    >>> content = meshio.Mesh(
-    ...     [[0.0, 0.0], [1.0, 0.0]], [("line", [[0, 1]])],
-    ...     cell_data={"set:rod": [[1]]}, point_data={"set:tip": [0, 1]},
-    ... )
-    >>> from_meshio(content).parts
-    {'rod': array([0])}
-    """
-    points = _three_coordinates(content, source)
-    lines, parts = _lines_and_parts(content, source)
-    _check_far(points, source)
-    _check_nodes("line", lines, len(points), source)
-    used = np.unique(lines)
-    number = np.full(len(points), -1)
-    number[used] = np.arange(len(used))
-    sets = {name: number[nodes] for name, nodes in _point_sets(content, source).items()}
-    parts = {name: elements for name, elements in parts.items() if len(elements)}
-    return FrameMesh(
-        points[used],
-        number[lines],
-        _names(parts),
-        {name: nodes[nodes >= 0] for name, nodes in sets.items()},
-        source,
-        element_types=_types(parts),
-    )
-
-
-def structure_from_meshio(content: MeshLike, source: str = "meshio mesh") -> StructureMesh:
+def from_meshio(content: MeshLike, source: str = "meshio mesh") -> StructureMesh:
     """Take cells, groups and points of all kinds out of a `meshio.Mesh`.
+
+    The conventions are those of `read_mesh`.
 
     Examples
     --------
@@ -64,7 +32,7 @@ def structure_from_meshio(content: MeshLike, source: str = "meshio mesh") -> Str
     ...     [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [("triangle", [[0, 1, 2]])],
     ...     cell_data={"set:sheet": [[1]]},
     ... )
-    >>> structure_from_meshio(content).part("sheet")
+    >>> from_meshio(content).part("sheet")
     {'triangle': array([0])}
     """
     points = _three_coordinates(content, source)
@@ -103,7 +71,8 @@ def structure_from_meshio(content: MeshLike, source: str = "meshio mesh") -> Str
         },
         source,
     )
-    sets = {name: nodes for name, nodes in _point_sets(content, source).items() if len(nodes)}
+    sets = _point_sets(content, source)
+    sets = {name: nodes for name, nodes in sets.items() if len(nodes) or name not in named}
     return StructureMesh(
         points, whole, _names(named), sets, source, notes=notes, element_types=_types(named)
     )
@@ -165,54 +134,6 @@ def _three_coordinates(content: MeshLike, source: str) -> FloatArray:
     if points.ndim != 2 or not 1 <= points.shape[1] <= 3:
         raise ModelError(f"{source}: the mesh is empty (no points)")
     return np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
-
-
-def _lines_and_parts(content: MeshLike, source: str) -> tuple[IntArray, dict[str, IntArray]]:
-    curved = sorted({b.type for b in content.cells if b.type.startswith("line")} - set(SPANS))
-    if curved:
-        raise ModelError(
-            f"{source}: elements of type {quoted(curved)} are not straight two-node lines;"
-            " make the mesh of first order"
-        )
-    advice = "a frame has lines only; read it as a structure, or ignore these by their names"
-    if any(block.type in SPANS and len(block.data) for block in content.cells):
-        _check_kinds(content, {*SPANS, "vertex"}, source, advice)
-    lines: list[IntArray] = []
-    parts: dict[str, list[IntArray]] = {}
-    first = 0
-    for index, block in enumerate(content.cells):
-        if block.type in SPANS and len(block.data):
-            pieces = straight_pieces(content, block.type, block.data, source)
-            count = len(SPANS[block.type])
-            for name, elements in _groups(content, index, 1, source):
-                halves = count * elements[:, None] + np.arange(count)
-                parts.setdefault(name, []).append(halves.ravel() + first)
-            lines.append(pieces)
-            first += len(pieces)
-    if not lines:
-        found = sorted({block.type for block in content.cells if len(block.data)})
-        raise ModelError(f"{source}: the mesh has no line elements (its cells are {quoted(found)})")
-    return np.concatenate(lines), {name: np.concatenate(p) for name, p in parts.items()}
-
-
-def straight_pieces(content: MeshLike, kind: str, cells: ArrayLike, source: str) -> IntArray:
-    """Two-node lines (e, 2) of lines with two or three nodes; a curved one is refused."""
-    nodes = np.asarray(cells, dtype=np.int64)
-    _check_nodes(kind, nodes, len(content.points), source)
-    if kind == "line3":
-        points = _three_coordinates(content, source)[nodes]
-        span, arm = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
-        square = np.sum(span**2, axis=1)
-        share = np.sum(span * arm, axis=1) / np.where(square > 0.0, square, np.inf)
-        aside = np.linalg.norm(arm - share[:, None] * span, axis=1)
-        bad = np.flatnonzero((aside > ASIDE * np.sqrt(square)) | (np.abs(share - 0.5) >= 0.5))
-        if len(bad):
-            raise ModelError(
-                f"{source}: line3 {bad[0]} (counted from 0) is not straight; a frame has straight"
-                " beams: make the mesh of first order, or use a structure, where a line of three"
-                " nodes is two beams"
-            )
-    return np.stack([nodes[:, list(ends)] for ends in SPANS[kind]], axis=1).reshape(-1, 2)
 
 
 def _point_sets(content: MeshLike, source: str) -> dict[str, IntArray]:

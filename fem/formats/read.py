@@ -1,11 +1,10 @@
-"""Read meshes of frames and structures from Gmsh, VTK and Abaqus files."""
+"""Read meshes from Gmsh, VTK and Abaqus files."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
 
 from fem.base.errors import ModelError, quoted
 from fem.formats.abaqus import read_abaqus
@@ -13,7 +12,7 @@ from fem.formats.abaqus.deck import bare
 from fem.formats.content import MeshContent
 from fem.formats.deck_file import DeckFile
 from fem.formats.faults import reason_of
-from fem.formats.from_meshio import from_meshio, structure_from_meshio
+from fem.formats.from_meshio import from_meshio
 from fem.formats.gmsh import read_gmsh
 from fem.formats.ignored import without_cells
 from fem.formats.med import read_med
@@ -21,11 +20,7 @@ from fem.formats.nastran import read_nastran
 from fem.formats.unv import read_unv
 from fem.formats.vtk_legacy import read_vtk
 from fem.formats.vtu import read_vtu
-from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.structure_mesh import StructureMesh
-
-Mesh = TypeVar("Mesh", FrameMesh, StructureMesh)
-
 
 READERS: dict[str, tuple[str, Callable[[Path], MeshContent]]] = {
     ".msh": ("Gmsh", read_gmsh),
@@ -44,24 +39,25 @@ PROGRAMS = {DECK: "Abaqus", UNIVERSAL: "universal", **dict.fromkeys(NASTRAN, "Na
 
 def read_mesh(
     path: str | Path, include_folders: Iterable[str | Path] = (), ignore: Sequence[str] = ()
-) -> FrameMesh:
-    """Read a line mesh with its named parts and points.
+) -> StructureMesh:
+    """Read a mesh of lines, surfaces and volumes with its named groups and points.
 
     Parameters
     ----------
     path
         A file whose extension says what it is:
 
-        - ``.msh``: Gmsh 2.2 or 4.1, ASCII or binary. Physical curves are the parts, physical
-          points the points; a group without a name goes by its number.
+        - ``.msh``: Gmsh 2.2 or 4.1, ASCII or binary. Physical groups are groups of cells, physical
+          points are point sets; a group without a name goes by its number.
         - ``.vtu``, ``.vtk``: VTK unstructured grid. VTK has neither cell sets nor point sets, so
-          a cell array ``set:NAME`` that is 1 on the elements of a part, else 0, names the part,
-          and a point array ``set:NAME`` that is 1 at one node names a point.
-        - ``.med``: MED of version 3 or later. Groups of edges and of nodes are parts and points.
+          a cell array ``set:NAME`` that is 1 on the cells of a group, else 0, names the group,
+          and a point array ``set:NAME`` that is 1 at its nodes names a point set.
+        - ``.med``: MED of version 3 or later. Groups of cells and of nodes.
         - ``.unv``: universal file, as Salome writes it, with its groups likewise.
         - ``.bdf``, ``.dat``, ``.nas``: Nastran bulk data, with supports, masses and springs.
-          Properties are the parts, "PBAR 3".
-        - ``.inp``: Abaqus input. ELSET and NSET, also those given on ``*ELEMENT`` and ``*NODE``.
+          Properties are the groups, "PBAR 3".
+        - ``.inp``: Abaqus input. ELSET are groups and NSET point sets, also those given on
+          ``*ELEMENT`` and ``*NODE``.
 
     include_folders
         Folders from which decks may include other files, beside their own.
@@ -73,68 +69,25 @@ def read_mesh(
 
     Returns
     -------
-    FrameMesh
-        All coordinates as in the file. A straight line of three nodes becomes two elements. The
-        nodes that are on no line are left out.
+    StructureMesh
+        All cells, and all coordinates as in the file. Hexahedra, wedges, pyramids and
+        quadrilaterals some of whose nodes are repeated are the wedges, pyramids, tetrahedra and
+        triangles that they mean; `notes` tell how many.
 
     Raises
     ------
     ModelError
         If the file does not exist, has another extension or another content, or if it has no
-        line elements, curved lines, surfaces or volumes, coordinates that are not finite, or
-        whatever `FrameMesh` refuses.
+        cells, cells of a kind that `fem` does not know, which it names, coordinates that are not
+        finite, or whatever `StructureMesh` refuses.
 
     Examples
     --------
     >>> import fem
     >>> mesh = fem.read_mesh("meshes/half_beam.msh")
-    >>> sorted(mesh.parts), sorted(mesh.point_sets)
+    >>> sorted(mesh.groups), sorted(mesh.point_sets)
     (['beam', 'leaf'], ['corner', 'foot', 'middle'])
     """
-    return _read(path, from_meshio, include_folders, ignore)
-
-
-def read_structure(
-    path: str | Path, include_folders: Iterable[str | Path] = (), ignore: Sequence[str] = ()
-) -> StructureMesh:
-    """Read a mesh of lines, surfaces and volumes with its named groups and points.
-
-    Parameters
-    ----------
-    path
-        A file as for `read_mesh`. In ``.msh`` files all physical groups are groups of cells, and
-        physical points are point sets; in ``.vtu`` files the arrays ``set:NAME``; in ``.inp``
-        files ELSET are groups and NSET point sets.
-    include_folders, ignore
-        As for `read_mesh`.
-
-    Returns
-    -------
-    StructureMesh
-        All cells. Hexahedra, wedges, pyramids and quadrilaterals some of whose nodes are repeated
-        are the wedges, pyramids, tetrahedra and triangles that they mean; `notes` tell how many.
-
-    Raises
-    ------
-    ModelError
-        As for `read_mesh`, for cells of a kind that `fem` does not know, which it names, and for
-        whatever `StructureMesh` refuses.
-
-    Examples
-    --------
-    >>> import fem
-    >>> sorted(fem.read_structure("meshes/half_beam.msh").groups)
-    ['beam', 'leaf']
-    """
-    return _read(path, structure_from_meshio, include_folders, ignore)
-
-
-def _read(
-    path: str | Path,
-    build: Callable[[MeshContent, str], Mesh],
-    include_folders: Iterable[str | Path],
-    ignore: Sequence[str],
-) -> Mesh:
     path = Path(path)
     extension = path.suffix.lower()
     if extension not in EXTENSIONS:
@@ -154,16 +107,16 @@ def _read(
         raise ModelError(f"{path}: the mesh file is empty")
     try:
         if extension == DECK:
-            return _deck_mesh(path, build, include_folders, ignore)
+            return _deck_mesh(path, include_folders, ignore)
         if extension in NASTRAN:
             deck = read_nastran(path, include_folders, ignore)
             others = [name for name in ignore if name.upper() not in deck.ignored]
-            return _with_attached(path, build, deck, others)
+            return _with_attached(path, deck, others)
         whole, left_out = (
             read_unv(path) if extension == UNIVERSAL else (READERS[extension][1](path), [])
         )
         content, said = without_cells(whole, ignore, str(path))
-        mesh = _noted(_with_unit(build(content, str(path)), whole.unit), said)
+        mesh = _noted(_with_unit(from_meshio(content, str(path)), whole.unit), said)
         return replace(mesh, left_out=left_out)
     except ModelError:
         raise
@@ -177,34 +130,32 @@ def _read(
 
 def _deck_mesh(
     path: Path,
-    build: Callable[[MeshContent, str], Mesh],
     include_folders: Iterable[str | Path],
     ignore: Sequence[str],
-) -> Mesh:
+) -> StructureMesh:
     """The mesh of an Abaqus file, with what the file attaches to it."""
     found = read_abaqus(path, include_folders, ignore)
     others = [name for name in ignore if bare(name) not in found.ignored]
-    return _with_attached(path, build, found, others)
+    return _with_attached(path, found, others)
 
 
 def _with_attached(
     path: Path,
-    build: Callable[[MeshContent, str], Mesh],
     found: DeckFile,
     ignore: Sequence[str],
-) -> Mesh:
+) -> StructureMesh:
     """The mesh of a deck, with what the deck attaches to it and says of it."""
     content, said = without_cells(found.content, ignore, str(path))
     notes = list(found.notes) + said
     return replace(
-        _noted(build(content, str(path)), notes),
+        _noted(from_meshio(content, str(path)), notes),
         attachments=found.attachments,
         described=found.described,
         left_out=found.left_out,
     )
 
 
-def _with_unit(mesh: Mesh, unit: str) -> Mesh:
+def _with_unit(mesh: StructureMesh, unit: str) -> StructureMesh:
     """A mesh with the unit that its file states."""
     if unit in ("", "m"):
         return mesh
@@ -215,6 +166,6 @@ def _with_unit(mesh: Mesh, unit: str) -> Mesh:
     return _noted(replace(mesh, unit=unit), [note])
 
 
-def _noted(mesh: Mesh, said: Sequence[str]) -> Mesh:
+def _noted(mesh: StructureMesh, said: Sequence[str]) -> StructureMesh:
     """A mesh with further notes."""
     return replace(mesh, notes=[*mesh.notes, *said]) if said else mesh

@@ -17,7 +17,6 @@ from fem.formats.content import CellBlock
 from fem.formats.ignored import SET_PREFIX
 from fem.formats.vtu import write_vtu
 from fem.mesh.cells import KINDS
-from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.structure_mesh import StructureMesh
 
 ABAQUS_TYPES = {
@@ -28,21 +27,21 @@ ABAQUS_TYPES = {
 ABAQUS_TYPES |= {"line": "B31", "line3": "B32"}
 
 
-def write_mesh(mesh: FrameMesh | StructureMesh, path: str | Path) -> None:
-    """Write a mesh so that `read_mesh`, or `read_structure`, gives it back.
+def write_mesh(mesh: StructureMesh, path: str | Path) -> None:
+    """Write a mesh so that `read_mesh` gives it back.
 
     Parameters
     ----------
     mesh
-        The mesh. One of a structure is written as ``.vtu`` or ``.inp`` only.
+        The mesh.
     path
-        File ending in ``.msh`` (Gmsh 2.2, ASCII), ``.vtu`` or ``.inp`` (Abaqus: B21 elements of a
-        frame; of a structure elements of the types that the mesh knows of, else B31, CPS and C3D).
+        File ending in ``.vtu``, ``.inp`` (Abaqus: elements of the types that the mesh knows of,
+        else B31, CPS and C3D) or, of a mesh of two-node lines, ``.msh`` (Gmsh 2.2, ASCII).
 
     Raises
     ------
     ModelError
-        For another extension, for a mesh to which masses or springs are attached, for parts that
+        For another extension, for a mesh to which masses or springs are attached, for groups that
         overlap in a Gmsh file, which cannot say so, for cells that Abaqus has no elements for, or
         if the file cannot be written.
 
@@ -61,14 +60,7 @@ def write_mesh(mesh: FrameMesh | StructureMesh, path: str | Path) -> None:
             f"{path}: something is attached to the mesh ({mesh.attachments}), which a mesh file"
             " would lose; write it without, by dataclasses.replace(mesh, attachments=Attachments())"
         )
-    if isinstance(mesh, StructureMesh):
-        structures = {".vtu": _write_structure, ".inp": _write_abaqus_structure}
-        if path.suffix.lower() not in structures:
-            raise ModelError(f"{path}: the mesh of a structure is written as '.vtu' or '.inp' only")
-        with plain_write_errors(path):
-            structures[path.suffix.lower()](mesh, path)
-        return
-    writers = {".msh": _write_gmsh, ".vtu": _write_frame, ".inp": _write_abaqus}
+    writers = {".msh": _write_gmsh, ".vtu": _write_vtu, ".inp": _write_abaqus}
     if path.suffix.lower() not in writers:
         raise ModelError(
             f"{path}: unknown mesh extension {path.suffix!r}; known are {quoted(writers)}"
@@ -77,19 +69,23 @@ def write_mesh(mesh: FrameMesh | StructureMesh, path: str | Path) -> None:
         writers[path.suffix.lower()](mesh, path)
 
 
-def _write_gmsh(mesh: FrameMesh, path: Path) -> None:
-    """Version 2.2, ASCII: elements of one physical group each, and vertices for the points."""
-    tags = np.zeros(len(mesh.lines), dtype=np.int64)
+def _write_gmsh(mesh: StructureMesh, path: Path) -> None:
+    """Version 2.2, ASCII: lines of one physical group each, and vertices for the points."""
+    if set(mesh.cells) != {"line"}:
+        raise ModelError(f"{path}: only a mesh of two-node lines is written as '.msh'")
+    lines = mesh.cells["line"]
+    tags = np.zeros(len(lines), dtype=np.int64)
     names: list[tuple[int, str]] = []
-    for tag, (name, elements) in enumerate(mesh.parts.items(), start=1):
-        if tags[elements].any():
-            raise ModelError(f"{path}: part {name!r} overlaps another, which Gmsh 2.2 cannot say")
-        tags[elements] = tag
+    for tag, (name, group) in enumerate(mesh.groups.items(), start=1):
+        at = group.get("line", np.zeros(0, dtype=np.int64))
+        if tags[at].any():
+            raise ModelError(f"{path}: group {name!r} overlaps another, which Gmsh 2.2 cannot say")
+        tags[at] = tag
         names.append((1, name))
-    cells = [(1, tag, ends) for tag, ends in zip(tags.tolist(), mesh.lines.tolist(), strict=True)]
+    cells = [(1, tag, ends) for tag, ends in zip(tags.tolist(), lines.tolist(), strict=True)]
     for tag, (name, nodes) in enumerate(mesh.point_sets.items(), start=len(names) + 1):
-        if name in mesh.parts:
-            raise ModelError(f"{path}: {name!r} names both a part and a point")
+        if name in mesh.groups:
+            raise ModelError(f"{path}: {name!r} names both a group and a point set")
         cells += [(15, tag, [node]) for node in nodes.tolist()]
         names.append((0, name))
     points = enumerate(mesh.points.tolist(), start=1)
@@ -108,15 +104,7 @@ def _write_gmsh(mesh: FrameMesh, path: Path) -> None:
     path.write_text("".join(rows), encoding="utf-8")
 
 
-def _write_frame(mesh: FrameMesh, path: Path) -> None:
-    marks = {
-        SET_PREFIX + name: _flags(elements, len(mesh.lines))
-        for name, elements in mesh.parts.items()
-    }
-    write_vtu(path, mesh.points, [CellBlock("line", mesh.lines)], _marked_points(mesh), marks)
-
-
-def _write_structure(mesh: StructureMesh, path: Path) -> None:
+def _write_vtu(mesh: StructureMesh, path: Path) -> None:
     none = np.zeros(0, dtype=np.int64)
     marks = {
         SET_PREFIX + name: np.concatenate(
@@ -128,7 +116,7 @@ def _write_structure(mesh: StructureMesh, path: Path) -> None:
     write_vtu(path, mesh.points, blocks, _marked_points(mesh), marks)
 
 
-def _marked_points(mesh: FrameMesh | StructureMesh) -> dict[str, npt.NDArray[np.int8]]:
+def _marked_points(mesh: StructureMesh) -> dict[str, npt.NDArray[np.int8]]:
     return {
         SET_PREFIX + name: _flags(nodes, len(mesh.points))
         for name, nodes in mesh.point_sets.items()
@@ -141,11 +129,7 @@ def _flags(indices: IntArray, count: int) -> npt.NDArray[np.int8]:
     return values
 
 
-def _write_abaqus(mesh: FrameMesh, path: Path) -> None:
-    _write_deck(path, mesh.points, [("B21", mesh.lines)], mesh.parts, mesh.point_sets)
-
-
-def _write_abaqus_structure(mesh: StructureMesh, path: Path) -> None:
+def _write_abaqus(mesh: StructureMesh, path: Path) -> None:
     counts = [len(cells) for cells in mesh.cells.values()]
     first = dict(zip(mesh.cells, np.cumsum([0, *counts]).tolist(), strict=False))
     groups = {

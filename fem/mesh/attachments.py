@@ -10,7 +10,7 @@ import numpy as np
 from fem.base.errors import ModelError, check_positive, is_finite, quoted
 
 DIRECTIONS = ("x", "y", "rotation")
-"""Of a plane frame; "rotation" is about z."""
+"""In the plane; "rotation" is about z."""
 SYMMETRIC = 1e-9  # of the largest entry: difference of two that are rounding
 SPATIAL_DIRECTIONS = (*DIRECTIONS, "z", "rotation_x", "rotation_y", "rotation_z")
 
@@ -21,11 +21,6 @@ def known_direction(owner: str, direction: str) -> None:
             f"{owner}: there is no direction {direction!r}; use {quoted(DIRECTIONS)}, and in space"
             f" {quoted(SPATIAL_DIRECTIONS[3:])}"
         )
-
-
-def plane_direction(direction: str) -> str:
-    """The name that a direction has in a plane frame, whose one rotation is about z."""
-    return "rotation" if direction == "rotation_z" else direction
 
 
 def vector(what: str, values: Sequence[float], length: int) -> tuple[float, ...]:

@@ -3,47 +3,36 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import overload
 
 import numpy as np
 
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
-from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.structure_mesh import StructureMesh
 
 
-@overload
-def refined(mesh: FrameMesh, times: int) -> FrameMesh: ...
-@overload
-def refined(mesh: StructureMesh, times: int) -> StructureMesh: ...
-def refined(mesh: FrameMesh | StructureMesh, times: int) -> FrameMesh | StructureMesh:
+def refined(mesh: StructureMesh, times: int) -> StructureMesh:
     """A mesh of lines with every line cut into equal pieces; names of parts and points stay.
 
     Parameters
     ----------
-    mesh : FrameMesh or StructureMesh
-        A mesh of two-node lines; a structure may have vertices, too.
+    mesh : StructureMesh
+        A mesh of two-node lines, and vertices.
     times : int
         Pieces of each line.
 
     Raises
     ------
     ModelError
-        For a structure with other cells.
+        For a mesh with other cells.
 
     Examples
     --------
     >>> import fem
     >>> mesh = fem.frame_mesh({"a": (0, 0), "b": (1, 0)}, [("arm", "a", "b", 2)])
-    >>> len(fem.refined(mesh, 3).lines)
+    >>> len(fem.refined(mesh, 3).cells["line"])
     6
     """
-    if isinstance(mesh, FrameMesh):
-        points, lines, pieces = _cut(mesh.points, mesh.lines, times)
-        parts = {name: pieces[elements].ravel() for name, elements in mesh.parts.items()}
-        types = {name: pieces[elements].ravel() for name, elements in mesh.element_types.items()}
-        return replace(mesh, points=points, lines=lines, parts=parts, element_types=types)
     if set(mesh.cells) - {"line", "vertex"}:
         raise ModelError(
             f"{mesh.source}: has cells other than two-node lines; refine it in the mesher"

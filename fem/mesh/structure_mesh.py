@@ -14,7 +14,7 @@ from fem.base.errors import ModelError, quoted
 from fem.mesh.attachments import Attachments, LeftOut
 from fem.mesh.cell_checks import cell_at, check_cells
 from fem.mesh.cells import CUBE, KINDS, PYRAMID, TETRAHEDRON, TRIANGLE, WEDGE
-from fem.mesh.frame_mesh import FrameMesh, index_sets, numbers
+from fem.mesh.checked_arrays import index_sets, numbers
 
 POINTS, CELLS = " (points)", " (cells)"
 """After a name that a point set and a group share, to tell which is meant."""
@@ -255,30 +255,6 @@ class StructureMesh:
     def _check_range(self, what: str, indices: IntArray, count: int) -> None:
         if indices.size and not (indices.min() >= 0 and indices.max() < count):
             raise ModelError(f"{self.source}: {what} has an index outside 0 to {count - 1}")
-
-
-def structure_mesh(frame: FrameMesh) -> StructureMesh:
-    """The lines of a frame as a mesh of a structure, with the same names.
-
-    Examples
-    --------
-    >>> import fem
-    >>> frame = fem.frame_mesh({"a": (0, 0, 0), "b": (1, 0, 2)}, [("rod", "a", "b", 2)])
-    >>> structure_mesh(frame).part("rod")
-    {'line': array([0, 1])}
-    """
-    return StructureMesh(
-        frame.points,
-        {"line": frame.lines},
-        {name: {"line": elements} for name, elements in frame.parts.items()},
-        frame.point_sets,
-        frame.source,
-        attachments=frame.attachments,
-        element_types={name: {"line": cells} for name, cells in frame.element_types.items()},
-        described=frame.described,
-        left_out=frame.left_out,
-        unit=frame.unit,
-    )
 
 
 def joined(meshes: Sequence[StructureMesh], tolerance: float | None = None) -> StructureMesh:

@@ -17,7 +17,7 @@ def parts_of(mesh: StructureMesh, names: Iterable[str] | None = None) -> dict[st
     Parameters
     ----------
     mesh
-        A mesh that `fem.read_structure` read.
+        A mesh that `fem.read_mesh` read.
     names
         Of parts; by default all that have cells.
 
@@ -39,7 +39,7 @@ def parts_of(mesh: StructureMesh, names: Iterable[str] | None = None) -> dict[st
     ...     "GRID,1,,0.,0.,0.\\nGRID,2,,1.,0.,0.\\nGRID,3,,0.,1.,0.\\nGRID,4,,0.,0.,1.\\n"
     ...     "CTETRA,1,3,1,2,3,4\\nPSOLID,3,1\\nMAT1,1,2.1+11,,.3,7800.\\n"
     ... )
-    >>> list(parts_of(fem.read_structure(path)))
+    >>> list(parts_of(fem.read_mesh(path)))
     ['PSOLID 3']
     """
     found: dict[str, Part] = {}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,10 +23,7 @@ from fem.mesh.attachments import (
     PointMatrix,
     Support,
 )
-from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.structure_mesh import StructureMesh
-from fem.model.frame import LISTS as FRAME_LISTS
-from fem.model.frame import FrameModel
 from fem.model.parts import BeamPart, Material, ShellPart, SolidPart, TrussPart
 from fem.model.plates import PlateSection
 from fem.model.sections import (
@@ -38,16 +35,14 @@ from fem.model.sections import (
     TaperedSection,
     added,
 )
-from fem.model.structure import LISTS as STRUCTURE_LISTS
-from fem.model.structure import Part, StructureModel
+from fem.model.structure import LISTS, Part, StructureModel
 from fem.model.supports import Interface
 
-FORMAT = "fem frame 2"
-STRUCTURE_FORMAT = "fem structure 2"
+FORMAT = "fem model 3"
+OF_FRAMES, OF_STRUCTURES = "fem frame 2", "fem structure 2"
+"""Formats of files before `FORMAT`, which are read, too."""
 Arrays = dict[str, npt.NDArray[Any]]
-Lists = Mapping[str, type]
-Model = TypeVar("Model")
-BROUGHT: Lists = {
+BROUGHT: Mapping[str, type] = {
     "point_masses": PointMass,
     "links": Link,
     "couplings": Coupling,
@@ -62,7 +57,7 @@ SECTIONS = {
 }
 
 
-def save_model(model: FrameModel, path: str | os.PathLike[str]) -> None:
+def save_model(model: StructureModel, path: str | os.PathLike[str]) -> None:
     """Write a model, whole or not at all.
 
     A cross-section of a class that is not from this package is kept by its numbers.
@@ -75,130 +70,95 @@ def save_model(model: FrameModel, path: str | os.PathLike[str]) -> None:
     Examples
     --------
     >>> import fem, pathlib, tempfile
-    >>> mesh = fem.frame_mesh({"a": (0, 0), "b": (1, 0)}, [("rod", "a", "b", 2)])
-    >>> part = fem.BeamPart(fem.Material(2.1e11, 7800.0), fem.CircularSection(0.01))
-    >>> path = pathlib.Path(tempfile.mkdtemp()) / "rod.npz"
-    >>> save_model(fem.FrameModel(mesh, {"rod": part}), path)
-    >>> load_model(path).parts["rod"] == part
-    True
-    """
-    mesh = model.mesh
-    arrays: dict[str, npt.NDArray[Any]] = {"points": mesh.points, "lines": mesh.lines}
-    arrays |= {f"part {name}": elements for name, elements in mesh.parts.items()}
-    arrays |= {f"type {name}": elements for name, elements in mesh.element_types.items()}
-    arrays |= {f"point {name}": nodes for name, nodes in mesh.point_sets.items()}
-    _write(path, FORMAT, _attached(model, FRAME_LISTS), arrays)
-
-
-def save_structure(model: StructureModel, path: str | os.PathLike[str]) -> None:
-    """Write a structure as `save_model` writes a frame.
-
-    Examples
-    --------
-    >>> import fem, pathlib, tempfile
     >>> model = fem.StructureModel(
     ...     fem.box_mesh("bar", (1.0, 0.1, 0.1), (2, 1, 1)),
     ...     {"bar": fem.SolidPart(fem.Material(2.1e11, 7800.0, 0.3))},
     ...     couplings=[fem.Coupling("tip", "x1")],
     ... )
     >>> path = pathlib.Path(tempfile.mkdtemp()) / "bar.npz"
-    >>> save_structure(model, path)
-    >>> load_structure(path).couplings == model.couplings
+    >>> save_model(model, path)
+    >>> load_model(path).couplings == model.couplings
     True
     """
     mesh = model.mesh
-    arrays: dict[str, npt.NDArray[Any]] = {"points": mesh.points}
+    arrays: Arrays = {"points": mesh.points}
     arrays |= {f"cells {kind}": nodes for kind, nodes in mesh.cells.items()}
     for name, group in mesh.groups.items():
         arrays |= {f"group {kind} {name}": cells for kind, cells in group.items()}
     for name, found in mesh.element_types.items():
         arrays |= {f"type {kind} {name}": cells for kind, cells in found.items()}
     arrays |= {f"point {name}": nodes for name, nodes in mesh.point_sets.items()}
-    attached = {**_attached(model, STRUCTURE_LISTS), "pinned": model.pinned}
-    _write(path, STRUCTURE_FORMAT, attached, arrays)
-
-
-def load_model(path: str | os.PathLike[str]) -> FrameModel:
-    """Read a model that `save_model` wrote.
-
-    Raises
-    ------
-    ModelError
-        If the file is missing or is not such a file.
-    """
-
-    def build(arrays: Arrays, attached: dict[str, Any]) -> FrameModel:
-        mesh = FrameMesh(
-            arrays["points"],
-            arrays["lines"],
-            _named(arrays, "part "),
-            _named(arrays, "point "),
-            attached["source"],
-            attachments=_from_file(attached),
-            element_types=_named(arrays, "type "),
-        )
-        return FrameModel(mesh, **_items(attached, FRAME_LISTS))
-
-    return _read(path, FORMAT, "frame", build)
-
-
-def load_structure(path: str | os.PathLike[str]) -> StructureModel:
-    """Read a model that `save_structure` wrote.
-
-    Raises
-    ------
-    ModelError
-        If the file is missing or is not such a file.
-    """
-
-    def build(arrays: Arrays, attached: dict[str, Any]) -> StructureModel:
-        mesh = StructureMesh(
-            arrays["points"],
-            _named(arrays, "cells "),
-            _named_by_kind(arrays, "group "),
-            _named(arrays, "point "),
-            attached["source"],
-            attachments=_from_file(attached),
-            element_types=_named_by_kind(arrays, "type "),
-        )
-        items = _items(attached, STRUCTURE_LISTS) | {"pinned": attached.get("pinned", ())}
-        # the mesh that was saved has the points of the couplings
-        items["couplings"] = [replace(coupling, at=None) for coupling in items["couplings"]]
-        return StructureModel(mesh, **items)
-
-    return _read(path, STRUCTURE_FORMAT, "structure", build)
-
-
-def _write(
-    path: str | os.PathLike[str], kind: str, attached: dict[str, Any], arrays: Arrays
-) -> None:
-    arrays = {"format": np.array(kind), "attached": np.array(json.dumps(attached)), **arrays}
+    text = json.dumps(_attached(model))
+    arrays = {"format": np.array(FORMAT), "attached": np.array(text), **arrays}
     target = Path(path)
     with plain_write_errors(target), draft_of(target) as draft, draft.open("wb") as file:
         np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
 
-def _read(
-    path: str | os.PathLike[str],
-    kind: str,
-    what: str,
-    build: Callable[[Arrays, dict[str, Any]], Model],
-) -> Model:
+def load_model(path: str | os.PathLike[str]) -> StructureModel:
+    """Read a model that `save_model` wrote, also in its earlier formats.
+
+    Raises
+    ------
+    ModelError
+        If the file is missing or is not such a file.
+    """
     if not Path(path).is_file():
-        raise ModelError(f"{path}: there is no such {what} file")
+        raise ModelError(f"{path}: there is no such model file")
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = dict(file)
-        if str(arrays["format"]) != kind:
+        attached = json.loads(str(arrays["attached"]))
+        kind = str(arrays["format"])
+        if kind == OF_FRAMES:
+            arrays, attached = _as_structure(arrays, attached)
+        elif kind not in (FORMAT, OF_STRUCTURES):
             raise KeyError("format")
-        return build(arrays, json.loads(str(arrays["attached"])))
+        return _model(arrays, attached)
     except ModelError:
         raise
     except Exception as error:
-        raise ModelError(f"{path}: is not a file of a saved {what}") from error
+        raise ModelError(f"{path}: is not a file of a saved model") from error
 
 
-def _attached(model: FrameModel | StructureModel, lists: Lists) -> dict[str, Any]:
+def _as_structure(arrays: Arrays, attached: dict[str, Any]) -> tuple[Arrays, dict[str, Any]]:
+    """What a file of a plane frame holds, as one of a structure does."""
+    sorts = {"lines": "cells line", "part": "group line", "type": "type line"}
+    words = {name: name.partition(" ") for name in arrays}
+    renamed = {
+        f"{sorts.get(sort, sort)}{space}{name}": arrays[key]
+        for key, (sort, space, name) in words.items()
+    }
+    return renamed, {**attached, "couplings": [], "foundations": [], "plane": True}
+
+
+def _model(arrays: Arrays, attached: dict[str, Any]) -> StructureModel:
+    mesh = StructureMesh(
+        arrays["points"],
+        _named(arrays, "cells "),
+        _named_by_kind(arrays, "group "),
+        _named(arrays, "point "),
+        attached["source"],
+        attachments=_from_file(attached),
+        element_types=_named_by_kind(arrays, "type "),
+    )
+    items: dict[str, Any] = {
+        name: [kind(**item) for item in attached[name]] for name, kind in LISTS.items()
+    }
+    # the mesh that was saved has the points of the couplings
+    items["couplings"] = [replace(coupling, at=None) for coupling in items["couplings"]]
+    return StructureModel(
+        mesh,
+        parts={name: _part_from(part) for name, part in attached["parts"].items()},
+        interfaces={name: Interface(**item) for name, item in attached["interfaces"].items()},
+        separate=bool(attached["separate"]),
+        pinned=attached.get("pinned", ()),
+        plane=attached.get("plane", False),
+        **items,
+    )
+
+
+def _attached(model: StructureModel) -> dict[str, Any]:
     return {
         "source": model.mesh.source,
         "from file": {
@@ -208,7 +168,9 @@ def _attached(model: FrameModel | StructureModel, lists: Lists) -> dict[str, Any
         "parts": {name: _part(part) for name, part in model.parts.items()},
         "interfaces": {name: asdict(item) for name, item in model.interfaces.items()},
         "separate": model.separate,
-        **{name: [asdict(item) for item in getattr(model, name)] for name in lists},
+        "pinned": model.pinned,
+        "plane": model.plane,
+        **{name: [asdict(item) for item in getattr(model, name)] for name in LISTS},
     }
 
 
@@ -222,15 +184,6 @@ def _from_file(attached: dict[str, Any]) -> Attachments:
 def _plain(item: Any) -> Any:
     """A name as it is; all else as a dictionary."""
     return item if isinstance(item, str) else asdict(item)
-
-
-def _items(attached: dict[str, Any], lists: Lists) -> dict[str, Any]:
-    return {
-        "parts": {name: _part_from(part) for name, part in attached["parts"].items()},
-        "interfaces": {name: Interface(**item) for name, item in attached["interfaces"].items()},
-        "separate": bool(attached["separate"]),
-        **{name: [kind(**item) for item in attached[name]] for name, kind in lists.items()},
-    }
 
 
 def _part(part: Part) -> dict[str, Any]:
@@ -283,16 +236,14 @@ def _plain_section(section: CrossSection, poissons_ratio: float | None) -> Secti
     )
 
 
-def _named(arrays: dict[str, npt.NDArray[Any]], prefix: str) -> dict[str, npt.NDArray[Any]]:
+def _named(arrays: Arrays, prefix: str) -> Arrays:
     named = {name: array for name, array in arrays.items() if name.startswith(prefix)}
     return {name.removeprefix(prefix): array for name, array in named.items()}
 
 
-def _named_by_kind(
-    arrays: dict[str, npt.NDArray[Any]], prefix: str
-) -> dict[str, dict[str, npt.NDArray[Any]]]:
+def _named_by_kind(arrays: Arrays, prefix: str) -> dict[str, Arrays]:
     """Arrays whose names are a kind of cell and a name, by name and kind."""
-    found: dict[str, dict[str, npt.NDArray[Any]]] = {}
+    found: dict[str, Arrays] = {}
     for key, cells in _named(arrays, prefix).items():
         kind, _, name = key.partition(" ")
         found.setdefault(name, {})[kind] = cells

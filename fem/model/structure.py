@@ -15,16 +15,15 @@ from fem.mesh.attachments import Attachments, Coupling, PointMass, PointSpring, 
 from fem.mesh.cells import KINDS, SPANS, CellKind, all_facets, facet_keys
 from fem.mesh.doubled import check_no_doubles
 from fem.mesh.element_types import check_family, counted, integration
-from fem.mesh.frame_mesh import FrameMesh
 from fem.mesh.lost import check_nothing_lost
 from fem.mesh.shell_centres import with_centres
 from fem.mesh.shell_facets import facets_of, shell_kinds
-from fem.mesh.structure_mesh import StructureMesh, structure_mesh
+from fem.mesh.structure_mesh import StructureMesh
 from fem.model.parts import BeamPart, ShellPart, SolidPart, TrussPart
 from fem.model.supports import Foundation, Hinge, Interface
 
 AXES = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
-"""The six directions of a node, in the order of `StructureComponent.shape`."""
+"""The six directions of a node, in the order of `Component.shape`."""
 IN_PLANE = ("x", "y", "rotation_z")
 NO_LENGTH = 1e-12  # of the mesh: so short, a beam has no direction
 OUT_OF_PLANE = 1e-9  # of the mesh: height of a plane one
@@ -90,14 +89,14 @@ class StructureModel:
     Parameters
     ----------
     mesh
-        A mesh with all kinds of cells; of a `FrameMesh` the lines are taken. Here shells of
-        ``quad8`` get a node in the middle of each cell, after those of the mesh.
+        A mesh with all kinds of cells. Here shells of ``quad8`` get a node in the middle of each
+        cell, after those of the mesh.
     parts
         By the name of the group of cells: `SolidPart` for bodies, `ShellPart` for triangles and
-        quadrilaterals in space, `BeamPart` and `TrussPart` for lines. With plane solids everything
-        lies and moves in the plane: x, y and the rotation about z.
+        quadrilaterals in space, `BeamPart` and `TrussPart` for lines.
     supports, point_masses, springs, hinges
-        As in a `FrameModel`, in up to six directions. The point of a support may be a face.
+        What holds, loads and joins the named points of the mesh. The point of a support may be a
+        face.
     couplings
         Faces joined to points, for beams, masses, springs, supports and interfaces on solids.
     foundations
@@ -108,6 +107,10 @@ class StructureModel:
         Whether nodes at one place may belong to pieces that nothing joins, and cells lie against
         each other without having the same nodes. Else `fem.assemble` refuses both: as a rule they
         were to be joined.
+    plane
+        Whether the structure lies and moves in the x-y plane: every node has x, y and the
+        rotation about z, and beams need no numbers but those of the plane. Plane solids make it
+        so.
     pinned
         Names of parts that are meant to meet solids in nodes or edges about which they turn. Of
         others a `JointWarning` tells.
@@ -131,6 +134,14 @@ class StructureModel:
     ... )
     >>> fem.assemble(model).stiffness.shape
     (144, 144)
+
+    A plane frame:
+
+    >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 4)])
+    >>> arm = fem.BeamPart(fem.Material(2.1e11, 7800.0), fem.CircularSection(0.02))
+    >>> held = [fem.Support("root", ("x", "y", "rotation"))]
+    >>> fem.assemble(fem.StructureModel(mesh, {"arm": arm}, held, plane=True)).stiffness.shape
+    (12, 12)
     """
 
     mesh: StructureMesh
@@ -144,10 +155,9 @@ class StructureModel:
     interfaces: Mapping[str, Interface] = field(default_factory=dict)
     separate: bool = False
     pinned: Sequence[str] = ()
+    plane: bool = False
 
     def __post_init__(self) -> None:
-        if isinstance(self.mesh, FrameMesh):
-            object.__setattr__(self, "mesh", structure_mesh(self.mesh))
         if not isinstance(self.mesh, StructureMesh):
             raise ModelError(f"model: mesh must be a StructureMesh, not {self.mesh!r}")
         for name, kind in LISTS.items():
@@ -156,6 +166,8 @@ class StructureModel:
         for name, sort, words in TABLES:
             given, what = getattr(self, name), f"by name, of {words}"
             object.__setattr__(self, name, by_name(self.mesh.source, name, given, sort, what))
+        flat = [part for part in self.parts.values() if isinstance(part, SolidPart) and part.plane]
+        object.__setattr__(self, "plane", bool(self.plane or flat))
         self._check_parts()
         shells = [name for name, part in self.parts.items() if isinstance(part, ShellPart)]
         object.__setattr__(self, "mesh", with_centres(self.mesh, shells))
@@ -163,11 +175,6 @@ class StructureModel:
         object.__setattr__(self, "mesh", self._with_coupled_points())
         self._check_plane()
         self._check_names()
-
-    @property
-    def is_plane(self) -> bool:
-        """Whether the structure lies and moves in the x-y plane, because a part does."""
-        return any(isinstance(part, SolidPart) and part.plane for part in self.parts.values())
 
     @cached_property
     def beams(self) -> dict[str, tuple[BeamPart, IntArray]]:
@@ -382,12 +389,12 @@ class StructureModel:
         return np.asarray((points.min(axis=0) + points.max(axis=0)) / 2.0, dtype=np.float64)
 
     def _check_plane(self) -> None:
-        if not self.is_plane:
+        if not self.plane:
             return
         if self.shells:
             raise ModelError(
-                f"{self.mesh.source}: shells and solids in the plane do not mix; make the plane"
-                " part a shell, too"
+                f"{self.mesh.source}: a structure in the plane has no shells; make its plane parts"
+                " shells, too, or leave it in space"
             )
         solid = [part for part in self.parts.values() if isinstance(part, SolidPart)]
         if not all(part.plane for part in solid):
@@ -402,12 +409,17 @@ class StructureModel:
         held = self.attached.supports
         named = [(f"support at {s.point!r}", d) for s in held for d in s.directions]
         named += [(f"spring at {spring.point!r}", spring.direction) for spring in self.springs]
+        named += [
+            (f"link at {link.first!r}", d)
+            for link in self.attached.links
+            for d in link.directions or ()
+        ]
         named += [(f"interface {name!r}", i.direction) for name, i in self.interfaces.items()]
         for owner, direction in named:
             if AXES[axis_index(direction)] not in IN_PLANE:
                 raise ModelError(
-                    f"{self.mesh.source}: {owner}: a plane structure has no direction"
-                    f" {direction!r}; it moves along x and y and turns about z"
+                    f"{self.mesh.source}: {owner}: a structure in the plane has no direction"
+                    f" {direction!r}; it moves along x and y and turns about z ('rotation')"
                 )
 
     def _part_cells(self) -> list[IntArray]:
@@ -433,6 +445,11 @@ class StructureModel:
             if hinge.part not in self.beams:
                 raise ModelError(
                     f"{self.mesh.source}: hinge at {hinge.point!r}: {hinge.part!r} is no beam part"
+                )
+            if self.hinges.count(hinge) > 1:
+                raise ModelError(
+                    f"{self.mesh.source}: the hinge of part {hinge.part!r} at {hinge.point!r} is"
+                    " given twice"
                 )
             if self.mesh.node(hinge.point) not in self.beams[hinge.part][1]:
                 raise ModelError(

@@ -1,9 +1,9 @@
-"""Pictures, animations and pages of deflected frames and structures with their true sections."""
+"""Pictures, animations and pages of deflected structures with their true sections."""
 
-from fem.render.frame_scenery import StopSphere
 from fem.render.gl import RenderError, gl_available
 from fem.render.page import write_motion, write_page
 from fem.render.pictures import animate, render_comparison, render_modes, render_shape
+from fem.render.scenery import StopSphere
 from fem.render.several import Several
 from fem.render.views import VIEWS
 

@@ -8,28 +8,27 @@ from typing import Any
 
 import numpy as np
 
+from fem.assembly.component import Component
 from fem.assembly.shells import shell_pieces
-from fem.assembly.structure import StructureComponent
 from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError, quoted
-from fem.elements.beams import local_axes, plane_matrices, run, spatial_matrices, to_nodes
+from fem.elements.beams import in_plane, local_axes, run, spatial_matrices, to_nodes
 from fem.elements.shell_stress import outer_stress
 from fem.elements.shells import facet_batches
 from fem.elements.solids import gradients_and_volumes, strains
-from fem.elements.straight_beams import rotations
 from fem.elements.tapers import along
 from fem.mesh.cells import KINDS
 from fem.model.parts import SolidPart
-from fem.render.frame_surface import FrameSurface, outline
 from fem.render.several import SeveralSurfaces
 from fem.render.structure_surface import StructureSurface, swept_parts
+from fem.render.swept import outline
 
 COLOURS = {"displacement": "m", "stress": "Pa", "moment": "N m"}
 """Quantities by which a picture can be coloured, with their units."""
 
 
 def surface_values(
-    drawing: FrameSurface | StructureSurface | SeveralSurfaces, u: FloatArray, colour: str
+    drawing: StructureSurface | SeveralSurfaces, u: FloatArray, colour: str
 ) -> FloatArray:
     """The quantity at every point of the surface, shape (P,), not negative.
 
@@ -57,31 +56,28 @@ def surface_values(
         pieces = drawing.component.pieces(u)
         parts = drawing.parts.items()
         return np.concatenate([surface_values(part, pieces[name], colour) for name, part in parts])
-    if isinstance(drawing, FrameSurface):
-        found = np.concatenate(list(_frame_values(drawing, u, colour)))
-        return found if drawing.mirror is None else np.tile(found, 2)
     nodal = np.zeros(len(drawing.nodes))
     if colour == "stress" and len(drawing.nodes):
         nodal = von_mises(drawing.component, u)
         nodal = np.maximum(nodal, shell_stresses(drawing.component, u))[drawing.nodes]
     nodal = np.maximum(drawing.with_middles(nodal), 0.0)
-    return np.concatenate([nodal, *_beam_values(drawing, u, colour)])
+    return drawing.with_image(np.concatenate([nodal, *_beam_values(drawing, u, colour)]))
 
 
-def colour_name(drawing: FrameSurface | StructureSurface | SeveralSurfaces, colour: str) -> str:
+def colour_name(drawing: StructureSurface | SeveralSurfaces, colour: str) -> str:
     """What the bar of colours says of a quantity, without its unit."""
     if colour != "stress":
         return "bending moment" if colour == "moment" else colour
     parts = drawing.parts.values() if isinstance(drawing, SeveralSurfaces) else [drawing]
     names = []
-    if any(isinstance(part, StructureSurface) and len(part.nodes) for part in parts):
+    if any(len(part.nodes) for part in parts):
         names.append("von Mises stress, averaged over cells")
-    if any(isinstance(part, FrameSurface) or part.beams for part in parts):
+    if any(part.beams for part in parts):
         names.append("stress of the outermost fibre of beams")
     return "; ".join(names)
 
 
-def von_mises(component: StructureComponent, u: FloatArray) -> FloatArray:
+def von_mises(component: Component, u: FloatArray) -> FloatArray:
     """Von Mises' stress in Pa at every node, the mean over the cells that meet there, (n,).
 
     Zero at nodes on no solid. The stress tensor is averaged, not its norm.
@@ -116,7 +112,7 @@ def von_mises(component: StructureComponent, u: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2))), dtype=np.float64)
 
 
-def shell_stresses(component: StructureComponent, u: FloatArray) -> FloatArray:
+def shell_stresses(component: Component, u: FloatArray) -> FloatArray:
     """Von Mises' stress in Pa at every node of shells, the mean over the facets there, (n,)."""
     model, shape = component.model, component.shape(u)
     total, count = np.zeros(len(model.mesh.points)), np.zeros(len(model.mesh.points))
@@ -160,29 +156,6 @@ def _from_places(kind: str) -> FloatArray:
     return np.asarray(at_nodes @ np.linalg.inv(at_places), dtype=np.float64)
 
 
-def _frame_values(drawing: FrameSurface, u: FloatArray, colour: str) -> Iterator[FloatArray]:
-    model = drawing.component.model
-    ends = drawing.component.element_shape(u).reshape(-1, 6)
-    directions = model.mesh.spans[:, :2] / model.mesh.lengths[:, None]
-    local = np.einsum("eij,ej->ei", rotations(directions), ends)
-    for swept in drawing.parts:
-        name = next(n for n, e in model.element_parts().items() if e is swept.elements)
-        part, elements, what = model.parts[name], swept.elements, f"part {name!r}"
-        lines = model.mesh.lines[elements]
-        K, _ = plane_matrices(
-            along(part, model.mesh, lines, what), model.mesh.lengths[elements], what
-        )
-        forces = np.einsum("eij,ej->ei", K, local[elements])
-        moment = _along(-forces[:, 2], forces[:, 5], swept.places)
-        values = np.abs(moment)
-        if colour == "stress":
-            section = along(part, model.mesh, lines, what, swept.places).section
-            height = outline(section)[..., 0].max(axis=-1)
-            axial = np.abs(forces[:, 3:4]) / section.area
-            values = axial + values * height / section.second_moment
-        yield np.repeat(values[..., None], swept.shape[2], axis=-1).ravel()
-
-
 def _beam_values(drawing: StructureSurface, u: FloatArray, colour: str) -> Iterator[FloatArray]:
     model = drawing.component.model
     for name, swept in drawing.beams:
@@ -197,7 +170,8 @@ def _beam_values(drawing: StructureSurface, u: FloatArray, colour: str) -> Itera
         T = to_nodes(part, local_axes(part, spans, what))
         ends = drawing.component.element_shape(u, name).reshape(-1, 12)
         lengths = np.linalg.norm(run(part, spans, what), axis=1)
-        K, _ = spatial_matrices(along(part, model.mesh, lines, what), lengths, what)
+        flat = in_plane(part, model.plane)
+        K, _ = spatial_matrices(along(part, model.mesh, lines, what), lengths, what, flat)
         forces = np.einsum("eij,ejk,ek->ei", K, T, ends)
         about_z = np.abs(_along(-forces[:, 5], forces[:, 11], swept.places))
         about_y = np.abs(_along(-forces[:, 4], forces[:, 10], swept.places))
@@ -205,11 +179,11 @@ def _beam_values(drawing: StructureSurface, u: FloatArray, colour: str) -> Itera
         if colour == "stress":
             section = along(part, model.mesh, lines, what, swept.places).section
             axial = np.abs(forces[:, 6:7]) / section.area
-            values = axial + _bending_stress(section, about_z, about_y)
+            values = axial + _bending_stress(section, about_z, None if flat else about_y)
         yield np.repeat(values[..., None], swept.shape[2], axis=-1).ravel()
 
 
-def truss_forces(component: StructureComponent, u: FloatArray, name: str) -> FloatArray:
+def truss_forces(component: Component, u: FloatArray, name: str) -> FloatArray:
     """Mean axial force (e,) in N of the lines of a truss, tension positive."""
     points = component.model.mesh.points
     part, lines = component.model.trusses[name][0], swept_parts(component.model)[name][1]
@@ -219,10 +193,11 @@ def truss_forces(component: StructureComponent, u: FloatArray, name: str) -> Flo
     return np.asarray(part.material.youngs_modulus * part.area * strain, dtype=np.float64)
 
 
-def _bending_stress(section: Any, about_z: FloatArray, about_y: FloatArray) -> FloatArray:
+def _bending_stress(section: Any, about_z: FloatArray, about_y: FloatArray | None) -> FloatArray:
     height, width = np.moveaxis(outline(section).max(axis=-2), -1, 0)
     found = about_z * height / section.second_moment
-    found = found + about_y * width / section.second_moment_across
+    if about_y is not None:
+        found = found + about_y * width / section.second_moment_across
     return np.asarray(found, dtype=np.float64)
 
 

@@ -15,8 +15,8 @@ import numpy.typing as npt
 from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError
 from fem.base.files import draft_of, plain_write_errors
-from fem.render.frame_scenery import StopSphere
 from fem.render.pictures import AnyComponent, checked_states, checked_times, surface_of
+from fem.render.scenery import StopSphere
 from fem.render.viewer import (
     mode_motion,
     packed,
@@ -49,7 +49,7 @@ def write_page(
     Parameters
     ----------
     component
-        The assembled frame or structure.
+        The assembled structure.
     shapes
         Shape (N, k): displacements of the free degrees of freedom, one shape in each column.
     titles
@@ -59,7 +59,7 @@ def write_page(
     heading
         Text above the picture.
     mirror
-        A point on a plane of symmetry, to draw half a frame whole.
+        A point on a plane of symmetry, to draw half a structure whole.
     stops
         The stops to draw, off by their gaps.
 
@@ -75,8 +75,8 @@ def write_page(
     >>> from fem.render import write_page
     >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 4)])
     >>> arm = fem.BeamPart(fem.Material(2e11, 7800.0), fem.RectangularSection(0.1, 0.02))
-    >>> component = fem.assemble(fem.FrameModel(
-    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))]))
+    >>> component = fem.assemble(fem.StructureModel(
+    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))], plane=True))
     >>> path = pathlib.Path(tempfile.mkdtemp()) / "arm.html"
     >>> write_page(component, np.eye(len(component.free))[:, :2], ["one", "two"], path)
     >>> "https://" in path.read_text()
@@ -111,7 +111,7 @@ def write_motion(
     Parameters
     ----------
     component
-        The assembled frame or structure.
+        The assembled structure.
     displacements
         In m, shape (m, N): one state for each instant, the last instant of a period left out. In
         between the motion is taken as linear.
@@ -142,8 +142,8 @@ def write_motion(
     >>> from fem.render import write_motion
     >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 4)])
     >>> arm = fem.BeamPart(fem.Material(2e11, 7800.0), fem.RectangularSection(0.1, 0.02))
-    >>> component = fem.assemble(fem.FrameModel(
-    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))]))
+    >>> component = fem.assemble(fem.StructureModel(
+    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))], plane=True))
     >>> times = np.arange(8) / 8
     >>> states = np.outer(np.sin(2 * np.pi * times), np.linspace(0, 1e-3, len(component.free)))
     >>> path = pathlib.Path(tempfile.mkdtemp()) / "arm.html"

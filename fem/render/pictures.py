@@ -1,4 +1,4 @@
-"""Pictures and animations of deflected frames and structures with their true sections.
+"""Pictures and animations of deflected structures with their true sections.
 
 A function with a path writes that file off-screen; without one it gives the pyvista plotter, not
 yet shown: ``plotter.show()`` opens a window, or the picture in a notebook. pyvista is imported when
@@ -19,27 +19,24 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from fem.assembly.frame import Component
-from fem.assembly.structure import StructureComponent
+from fem.assembly.component import Component
 from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError
 from fem.base.files import draft_of
 from fem.render.colouring import colour_name, surface_values
-from fem.render.frame_scenery import Block, StopSphere, mass_blocks, support_solids
-from fem.render.frame_surface import FrameSurface, frame_surface
 from fem.render.gl import RenderError, on_screen, require_gl, require_library
+from fem.render.scenery import Block, StopSphere, mass_blocks, support_marks
 from fem.render.several import OfPart, Several, SeveralSurfaces, Surface, stops_at
 from fem.render.stop_scenery import StopBody, largest_scale, stop_bodies
-from fem.render.structure_scenery import Cube, mass_cubes, support_marks
-from fem.render.structure_surface import StructureSurface, structure_surface, without_mirror
+from fem.render.structure_surface import StructureSurface, structure_surface
 from fem.render.views import MOTION, axes_of_view
 
 if TYPE_CHECKING:
     import pyvista
 
 
-AnyComponent = Component | StructureComponent | Several
-Mass = Block | Cube | OfPart
+AnyComponent = Component | Several
+Mass = Block | OfPart
 Image = npt.NDArray[np.uint8]
 Plotter = Any  # pyvista.Plotter while it is drawn in
 
@@ -55,13 +52,13 @@ PLANE = "#3a78b5"
 AUTO_FRACTION = 0.06
 BAR_ROW = 110
 GHOST_SHRINKAGE = 0.97
-"""Makes the undeformed frame a little thinner, so that the other hides it where they agree."""
+"""Makes undeformed beams a little thinner, so that the other hides it where they agree."""
 BEHIND = (2.0, 2.0e4)
 """Factor and units of OpenGL's polygon offset: faces at rest lie behind those they agree with."""
 TRIAD = 110  # pixels
 FIELD = (0.20, 0.85, 0.94)
 SHEET_FIELD = (0.05, 0.84, 0.94)
-"""Where the frame goes: from this part of the field's height to that, and of its width."""
+"""Where the structure goes: from this part of the field's height to that, and of its width."""
 
 
 @overload
@@ -105,7 +102,7 @@ def render_shape(
     view: str = MOTION,
     size: tuple[int, int] = (1600, 900),
 ) -> pyvista.Plotter | float:
-    """Picture of a deflected frame or structure, coloured by its displacement or stress.
+    """Picture of a deflected structure, coloured by its displacement or stress.
 
     Drawn with it: the same undeformed in grey, supports, point masses as blocks of steel of that
     mass, and the stops at their true places (their gaps scaled as the deflection is). The factor
@@ -114,7 +111,7 @@ def render_shape(
     Parameters
     ----------
     component
-        The assembled frame.
+        The assembled structure.
     u
         Displacements of the free degrees of freedom in m, shape (N,).
     path
@@ -127,7 +124,7 @@ def render_shape(
     stops
         The stops to draw.
     mirror
-        A point on a plane of symmetry, to draw half a frame whole.
+        A point on a plane of symmetry, to draw half a structure whole.
     colour
         "displacement"; "stress": von Mises' in solids, that of the outermost fibre in beams; or
         "moment": the bending moment of beams.
@@ -156,8 +153,8 @@ def render_shape(
     >>> from fem.render import gl_available, render_shape
     >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 4)])
     >>> arm = fem.BeamPart(fem.Material(2e11, 7800.0), fem.RectangularSection(0.1, 0.02))
-    >>> component = fem.assemble(fem.FrameModel(
-    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))]))
+    >>> component = fem.assemble(fem.StructureModel(
+    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))], plane=True))
     >>> u = np.linspace(0.0, 1e-3, len(component.free))
     >>> if gl_available()[0]:
     ...     factor = render_shape(component, u, "arm.png", title="An arm")
@@ -217,7 +214,7 @@ def render_modes(
     Parameters
     ----------
     component
-        The assembled frame.
+        The assembled structure.
     shapes
         Shape (N, k): one mode in each column, such as ``reduced.basis``.
     titles
@@ -251,8 +248,8 @@ def render_modes(
     >>> from fem.render import gl_available, render_modes
     >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 4)])
     >>> arm = fem.BeamPart(fem.Material(2e11, 7800.0), fem.RectangularSection(0.1, 0.02))
-    >>> component = fem.assemble(fem.FrameModel(
-    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))]))
+    >>> component = fem.assemble(fem.StructureModel(
+    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))], plane=True))
     >>> if gl_available()[0]:
     ...     render_modes(component, np.eye(len(component.free))[:, :2], ["one", "two"], "arm.png")
     """
@@ -374,12 +371,12 @@ def animate(
     fps: float = 25.0,
     size: tuple[int, int] = (1120, 540),
 ) -> float:
-    """Animation of a moving frame, repeated without end.
+    """Animation of a moving structure, repeated without end.
 
     Parameters
     ----------
     component
-        The assembled frame.
+        The assembled structure.
     displacements
         In m, shape (m, N): one state for each picture. For one period of an orbit leave out
         the last instant, which is the first again.
@@ -412,8 +409,8 @@ def animate(
     >>> from fem.render import animate, gl_available
     >>> mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 4)])
     >>> arm = fem.BeamPart(fem.Material(2e11, 7800.0), fem.RectangularSection(0.1, 0.02))
-    >>> component = fem.assemble(fem.FrameModel(
-    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))]))
+    >>> component = fem.assemble(fem.StructureModel(
+    ...     mesh, {"arm": arm}, [fem.Support("root", ("x", "y", "rotation"))], plane=True))
     >>> times = np.arange(5) / 5
     >>> states = np.outer(np.sin(2 * np.pi * times), np.linspace(0, 1e-3, len(component.free)))
     >>> if gl_available()[0]:
@@ -581,7 +578,7 @@ def scale_note(factor: float, stops: Sequence[StopSphere]) -> str:
 
 @dataclass(eq=False)
 class Moving:
-    """The deflected frame in a plotter; the only thing that changes from picture to picture."""
+    """The deflected structure in a plotter; the only thing that changes from picture to picture."""
 
     drawing: Surface
     factor: float
@@ -690,7 +687,7 @@ def polydata(drawing: Surface, points: FloatArray) -> tuple[Any, Any]:
 
 
 def surface_of(component: AnyComponent, mirror: str | None = None) -> Surface:
-    """The surface of a frame, a structure or several; only one frame can be mirrored.
+    """The surface of one component or several; only one can be mirrored.
 
     Raises
     ------
@@ -701,19 +698,9 @@ def surface_of(component: AnyComponent, mirror: str | None = None) -> Surface:
     if isinstance(component, Several):
         if mirror is not None:
             raise ModelError(f"{component.source}: several components are drawn without a mirror")
-        parts = {name: part_surface(part) for name, part in component.parts.items()}
+        parts = {name: structure_surface(part) for name, part in component.parts.items()}
         return SeveralSurfaces(component, parts)
-    return part_surface(component, mirror)
-
-
-def part_surface(
-    component: Component | StructureComponent, mirror: str | None = None
-) -> FrameSurface | StructureSurface:
-    """The surface of one component."""
-    if isinstance(component, StructureComponent):
-        without_mirror(component, mirror)
-        return structure_surface(component)
-    return frame_surface(component, mirror)
+    return structure_surface(component, mirror)
 
 
 def add_deflected(
@@ -724,7 +711,7 @@ def add_deflected(
     colour: str = "displacement",
     cmap: str = COLOURS,
 ) -> Moving:
-    """Draw the deflected frame and, in grey, the undeformed frame."""
+    """Draw the deflected structure and, in grey, the undeformed one."""
     rest, _ = drawing.place(np.zeros_like(u), shrinkage=GHOST_SHRINKAGE)
     ghost, ghost_edges = polydata(drawing, rest)
     pale = plotter.add_mesh(ghost, color=GHOST, opacity=0.16, lighting=False, show_scalar_bar=False)
@@ -759,7 +746,7 @@ def compose(
     size: tuple[int, int],
     view: str,
 ) -> None:
-    """Put everything around the deflected frame, with one range of colours for all states."""
+    """Put everything around the deflected structure, with one range of colours for all states."""
     drawing = moving.drawing
     add_surroundings(plotter, moving, moving.factor, stops)
     keep_room(plotter, drawing, states, moving.factor)
@@ -821,12 +808,10 @@ def surroundings(
 
 
 def part_surroundings(
-    drawing: FrameSurface | StructureSurface, stops: Sequence[StopSphere]
-) -> tuple[list[tuple[Any, bool]], list[Block | Cube]]:
+    drawing: StructureSurface, stops: Sequence[StopSphere]
+) -> tuple[list[tuple[Any, bool]], list[Block]]:
     """The marks of the supports of one component, and its masses."""
-    if isinstance(drawing, StructureSurface):
-        return list(support_marks(drawing)), [*mass_cubes(drawing, stops)]
-    return list(support_solids(drawing)), [*mass_blocks(drawing, stops)]
+    return list(support_marks(drawing)), mass_blocks(drawing, stops)
 
 
 def add_solid(plotter: Plotter, solid: Any, colour: str, smooth: bool = False) -> Any:
@@ -912,7 +897,7 @@ def fit_camera(
     axes: FloatArray,
     field: tuple[float, float, float] = FIELD,
 ) -> None:
-    """Look at the frame along the last of three axes, without perspective, as large as fits."""
+    """Look at the structure along the last of three axes, without perspective, as large as fits."""
     right, up, back = axes
     box = np.array(plotter.bounds).reshape(3, 2)
     corners = np.stack(np.meshgrid(*box, indexing="ij"), axis=-1).reshape(-1, 3)

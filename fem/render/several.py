@@ -9,13 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from fem.assembly.frame import Component
-from fem.assembly.structure import StructureComponent
+from fem.assembly.component import Component
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
-from fem.render.frame_scenery import Block, StopSphere
-from fem.render.frame_surface import FrameSurface
-from fem.render.structure_scenery import Cube
+from fem.render.scenery import Block, StopSphere
 from fem.render.structure_surface import StructureSurface
 
 
@@ -41,12 +38,12 @@ class Several:
     >>> def arm(start):
     ...     points = {"left": (start, 0), "right": (start + 1, 0)}
     ...     mesh = fem.frame_mesh(points, [("arm", "left", "right", 4)])
-    ...     return fem.assemble(fem.FrameModel(mesh, {"arm": steel}))
+    ...     return fem.assemble(fem.StructureModel(mesh, {"arm": steel}, plane=True))
     >>> Several({"one": arm(0), "other": arm(1)})
     <Several: one, other; 30 degrees of freedom>
     """
 
-    parts: Mapping[str, Component | StructureComponent]
+    parts: Mapping[str, Component]
 
     def __post_init__(self) -> None:
         if not self.parts:
@@ -88,7 +85,7 @@ class SeveralSurfaces:
     """
 
     component: Several
-    parts: Mapping[str, FrameSurface | StructureSurface]
+    parts: Mapping[str, StructureSurface]
 
     def place(
         self, u: FloatArray, scale: float = 1.0, shrinkage: float = 1.0
@@ -108,7 +105,7 @@ class SeveralSurfaces:
         return [edges + first for part, first in self._begun for edges in part.edges()]
 
     @cached_property
-    def _begun(self) -> list[tuple[FrameSurface | StructureSurface, int]]:
+    def _begun(self) -> list[tuple[StructureSurface, int]]:
         """Each surface with the index of its first point."""
         begun, first = [], 0
         for part in self.parts.values():
@@ -117,7 +114,7 @@ class SeveralSurfaces:
         return begun
 
 
-Surface = FrameSurface | StructureSurface | SeveralSurfaces
+Surface = StructureSurface | SeveralSurfaces
 
 
 def stops_at(name: str, stops: Sequence[StopSphere]) -> list[StopSphere]:
@@ -141,7 +138,7 @@ class OfPart:
     """A lumped mass of one of several components."""
 
     name: str
-    block: Block | Cube
+    block: Block
 
     @property
     def solid(self) -> Any:

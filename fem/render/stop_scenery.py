@@ -11,10 +11,8 @@ import numpy as np
 
 from fem.base.arrays import FloatArray
 from fem.base.errors import ModelError
-from fem.render.frame_scenery import MARK_FRACTION, StopSphere, reach
-from fem.render.frame_surface import FrameSurface
+from fem.render.scenery import StopSphere, direction_of, mark_of, reach
 from fem.render.several import SeveralSurfaces, Surface
-from fem.render.structure_scenery import direction_of, reach_along
 from fem.render.structure_surface import StructureSurface
 
 SINKING = 0.5
@@ -68,7 +66,7 @@ def stop_bodies(drawing: Surface, stop: StopSphere, scale: float) -> list[StopBo
     ]
 
 
-def owner(drawing: Surface, name: str) -> tuple[FrameSurface | StructureSurface, str]:
+def owner(drawing: Surface, name: str) -> tuple[StructureSurface, str]:
     """The surface on which a point lies, and what it is called there.
 
     Raises
@@ -84,22 +82,16 @@ def owner(drawing: Surface, name: str) -> tuple[FrameSurface | StructureSurface,
     return drawing.parts[part], point
 
 
-def place_of(part: FrameSurface | StructureSurface, point: str) -> FloatArray:
+def place_of(part: StructureSurface, point: str) -> FloatArray:
     """Where a point of the mesh lies, (3,), in m."""
     mesh = part.component.model.mesh
     return np.asarray(mesh.points[mesh.node(point)], dtype=np.float64)
 
 
-def touched(
-    part: FrameSurface | StructureSurface, point: str, stop: StopSphere
-) -> tuple[FloatArray, FloatArray]:
+def touched(part: StructureSurface, point: str, stop: StopSphere) -> tuple[FloatArray, FloatArray]:
     """Where the undeformed surface is touched, (3,) in m, and the unit vector (3,) to the stop."""
-    towards, place = direction_of(stop), place_of(part, point)
-    if isinstance(part, StructureSurface):
-        far = reach_along(part, place, towards)
-    else:
-        far = reach(part.component, part.component.model.mesh.node(point), towards[:2])[0]
-    return place + far * towards, towards
+    towards, node = direction_of(stop), part.component.model.mesh.node(point)
+    return place_of(part, point) + reach(part, node, towards) * towards, towards
 
 
 def point_move(drawing: Surface, u: FloatArray, name: str) -> FloatArray:
@@ -107,13 +99,7 @@ def point_move(drawing: Surface, u: FloatArray, name: str) -> FloatArray:
     part, point = owner(drawing, name)
     pieces = drawing.component.pieces(u) if isinstance(drawing, SeveralSurfaces) else {}
     own = pieces[name.partition(".")[0]] if pieces else u
-    node = part.component.model.mesh.node(point)
-    move = np.zeros(3)
-    if isinstance(part, StructureSurface):
-        move[:] = part.component.shape(own)[node, :3]
-    else:
-        move[:2] = part.component.shape(own)[node, :2]
-    return move
+    return part.component.shape(own)[part.component.model.mesh.node(point), :3]
 
 
 def penetration(drawing: Surface, u: FloatArray, stop: StopSphere) -> float:
@@ -147,11 +133,6 @@ def largest_scale(drawing: Surface, states: FloatArray, stops: Sequence[StopSphe
 def drawn_radius(drawing: Surface, stop: StopSphere) -> float:
     """Radius in m with which a stop is drawn: its own, or half of a mark."""
     return stop.radius or 0.5 * mark_of(owner(drawing, stop.point)[0])
-
-
-def mark_of(part: FrameSurface | StructureSurface) -> float:
-    """Size in m of the marks beside a component."""
-    return MARK_FRACTION * float(np.linalg.norm(np.ptp(part.component.model.mesh.points, axis=0)))
 
 
 def sphere(centre: FloatArray, radius: float) -> Any:

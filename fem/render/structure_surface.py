@@ -8,18 +8,19 @@ from functools import cached_property
 
 import numpy as np
 
-from fem.assembly.structure import StructureComponent
+from fem.assembly.component import Component
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
-from fem.elements.beams import local_axes, run, to_nodes
+from fem.elements.beams import hermite, local_axes, run, to_nodes
 from fem.elements.tapers import along
 from fem.elements.trusses import chords
 from fem.mesh.cells import KINDS, SPANS
 from fem.model.parts import BeamPart
-from fem.model.structure import StructureModel
-from fem.render.frame_surface import PartSurface, hermite, hermite_slope, open_ends, outline
+from fem.model.structure import AXES, IN_PLANE, StructureModel, axis_index
+from fem.render.swept import BoolArray, PartSurface, open_ends, outline
 
 SHARP_DEGREES = 30.0
+ON_PLANE = 1e-9  # of the size: so near to a mirror a node lies on it
 PIECES: dict[str, tuple[tuple[int, ...], ...]] = {
     **SPANS,
     "triangle": ((0, 1, 2),),
@@ -37,9 +38,9 @@ BEHIND = 2e-3
 class StructureSurface:
     """The surface of a whole structure, made by `structure_surface`.
 
-    It offers what a `FrameSurface` does: `place`, `faces` and `edges`. The points are first the
-    nodes of the solids' faces and of shells, then the middles of the faces with eight nodes, then
-    those of the beams, part by part.
+    The points are first the nodes of the solids' faces and of shells, then the middles of the faces
+    with eight nodes, then those of the beams, part by part; where it is repeated in a mirror, the
+    same again.
 
     Parameters
     ----------
@@ -53,25 +54,43 @@ class StructureSurface:
         The faces cut into polygons, and pairs of points along sharp edges.
     beams
         Names of beam parts and how they are swept.
+    mirror
+        None, or a point (3,) and a unit normal (3,) of the plane in which all is repeated.
     """
 
-    component: StructureComponent
+    component: Component
     nodes: IntArray
     eights: IntArray
     polygons: tuple[IntArray, ...]
     sharp: IntArray
     beams: tuple[tuple[str, PartSurface], ...]
+    mirror: tuple[FloatArray, FloatArray] | None = None
 
     def place(
         self, u: FloatArray, scale: float = 1.0, shrinkage: float = 1.0
     ) -> tuple[FloatArray, FloatArray]:
-        """Points (P, 3) of the deflected surface in m, and their displacement (P,), not scaled.
+        """Points of the deflected surface.
 
-        ``shrinkage`` is a factor on the sections of beams; solids keep their size.
+        The sections of beams stay across the drawn axis and keep their size at any scale.
+
+        Parameters
+        ----------
+        u
+            Displacements of the free degrees of freedom, shape (N,).
+        scale
+            Factor on the displacements.
+        shrinkage
+            Factor on the sections of beams; solids keep their size.
+
+        Returns
+        -------
+        points, displacement
+            In m, shape (P, 3), and the length of the displacement in m, not scaled, shape (P,);
+            that of a beam is of its axis.
         """
         moved = self.with_middles(self.component.shape(u)[self.nodes, :3])
         rest = self.with_middles(self.component.model.mesh.points[self.nodes])
-        if self.component.model.is_plane and shrinkage < 1.0:
+        if self.component.model.plane and shrinkage < 1.0:
             rest = rest - np.array([0.0, 0.0, BEHIND * self.component.model.mesh.size])
         points = [rest + scale * moved]
         size = [np.linalg.norm(moved, axis=1)]
@@ -79,7 +98,13 @@ class StructureSurface:
             at, displacement = self._sweep(name, swept, u, scale, shrinkage)
             points.append(at)
             size.append(displacement)
-        return np.concatenate(points), np.concatenate(size)
+        if self.mirror is not None:
+            points.append(reflected(np.concatenate(points), *self.mirror))
+        return np.concatenate(points), self.with_image(np.concatenate(size))
+
+    def with_image(self, values: FloatArray) -> FloatArray:
+        """Values of points, and again those of their images."""
+        return values if self.mirror is None else np.concatenate([values, values])
 
     def with_middles(self, values: FloatArray) -> FloatArray:
         """Values at `nodes` (p, ...), followed by those in the middle of the faces of `eights`.
@@ -94,22 +119,35 @@ class StructureSurface:
     def faces(self) -> list[IntArray]:
         """Arrays of polygons, each of shape (f, number of corners)."""
         swept = (part.faces() for _, part in self.beams)
-        return [*self.polygons, *self._shifted(swept)]
+        return self._with_images([*self.polygons, *self._shifted(swept)])
 
     def edges(self) -> list[IntArray]:
         """Arrays of index pairs of the sharp edges, each of shape (f, 2)."""
         swept = (part.edges() for _, part in self.beams)
-        return [self.sharp, *self._shifted(swept)]
+        return self._with_images([self.sharp, *self._shifted(swept)])
 
     @cached_property
     def starts(self) -> IntArray:
-        """Index of the first point of every beam part."""
+        """Index of the first point of every beam part, and of the image of all."""
         counts = [int(np.prod(part.shape)) for _, part in self.beams]
         first = len(self.nodes) + len(self.eights)
-        return first + np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)[:-1]
+        return first + np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+
+    def sections_at(self, node: int) -> FloatArray:
+        """Corners (c, 3) of the sections of the lines that end at a node, at rest, from there."""
+        rest, _ = self.place(np.zeros(len(self.component.free)))
+        found = [np.zeros((0, 3))]
+        for (name, swept), start in zip(self.beams, self.starts, strict=False):
+            index = start + np.arange(np.prod(swept.shape)).reshape(swept.shape)
+            lines = swept_parts(self.component.model)[name][1]
+            found += [rest[index[line, -end]] for line, end in np.argwhere(lines == node)]
+        return np.asarray(np.concatenate(found) - self.component.model.mesh.points[node])
+
+    def _with_images(self, cells: list[IntArray]) -> list[IntArray]:
+        return cells if self.mirror is None else cells + [each + self.starts[-1] for each in cells]
 
     def _shifted(self, cells: Iterator[Iterator[IntArray]]) -> Iterator[IntArray]:
-        for arrays, start in zip(cells, self.starts, strict=True):
+        for arrays, start in zip(cells, self.starts, strict=False):
             for array in arrays:
                 yield array + start
 
@@ -136,7 +174,7 @@ class StructureSurface:
         corners = np.broadcast_to(shrinkage * swept.outline, (*swept.shape, 2))
         local_points = axis[:, :, None, :] + np.einsum("emkc,emcj->emkj", corners, frame)
         points = start[:, None, None, :] + np.einsum("emkj,ejx->emkx", local_points, axes)
-        size = np.repeat(np.linalg.norm(moved, axis=-1)[..., None], len(corners), axis=-1)
+        size = np.repeat(np.linalg.norm(moved, axis=-1)[..., None], swept.shape[2], axis=-1)
         return points.reshape(-1, 3), size.ravel()
 
 
@@ -152,7 +190,7 @@ def swept_parts(model: StructureModel) -> dict[str, tuple[BeamPart, IntArray]]:
     return {**model.beams, **bars}
 
 
-def line_shape(component: StructureComponent, u: FloatArray, name: str) -> FloatArray:
+def line_shape(component: Component, u: FloatArray, name: str) -> FloatArray:
     """Six displacements at both ends of lines, (e, 2, 6); a truss turns as its ends move."""
     model = component.model
     if name in model.beams:
@@ -177,8 +215,9 @@ def local_deflection(
     stretch = np.broadcast_to((local[:, 6:7] - local[:, :1]) / L, u.shape)
     v = np.concatenate([local[:, [1]], L * local[:, [5]], local[:, [7]], L * local[:, [11]]], 1)
     w = np.concatenate([local[:, [2]], -L * local[:, [4]], local[:, [8]], -L * local[:, [10]]], 1)
-    moved = np.stack([u, v @ hermite(s).T, w @ hermite(s).T], axis=-1)
-    turns = (v @ hermite_slope(s).T / L, w @ hermite_slope(s).T / L)
+    cubics, slopes = hermite(s)
+    moved = np.stack([u, v @ cubics, w @ cubics], axis=-1)
+    turns = (v @ slopes / L, w @ slopes / L)
     twist = local[:, 3:4] * (1 - s) + local[:, 9:10] * s
     return moved, np.stack([stretch, *turns], axis=-1), twist
 
@@ -194,11 +233,28 @@ def section_frames(slope: FloatArray, twist: FloatArray) -> FloatArray:
     return np.stack([height, np.cross(tangent, height)], axis=-2)
 
 
-def structure_surface(component: StructureComponent, places: int | None = None) -> StructureSurface:
+def structure_surface(
+    component: Component, mirror: str | None = None, places: int | None = None
+) -> StructureSurface:
     """The surface of a structure, with the true sections of its beams.
 
     A shell is drawn as the surface through its nodes, without its thickness; a truss as a round
     bar.
+
+    Parameters
+    ----------
+    component
+        The assembled structure.
+    mirror
+        A point or face on a plane of symmetry, to draw a half model whole. The supports there must
+        hold what `fem.symmetry` does and so say which way the plane lies.
+    places
+        How many places along each line of beams; by default as many as make the whole smooth.
+
+    Raises
+    ------
+    ModelError
+        If there is no such point, or no support makes it one of a plane of symmetry.
 
     Examples
     --------
@@ -213,7 +269,11 @@ def structure_surface(component: StructureComponent, places: int | None = None) 
     [1.0, 0.1, 0.1]
     """
     model = component.model
-    facets = drawn_facets(component)
+    plane = None if mirror is None else symmetry_plane(component, mirror)
+    joined = nodes_on(model.mesh.points, plane)
+    facets = {
+        kind: cells[~joined[cells].all(axis=1)] for kind, cells in drawn_facets(component).items()
+    }
     used = [np.unique(cells) for cells in facets.values()]
     nodes = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=np.int64)
     position = np.full(len(model.mesh.points), -1)
@@ -227,27 +287,30 @@ def structure_surface(component: StructureComponent, places: int | None = None) 
         for kind, cells in facets.items()
         for piece in PIECES[kind]
     )
-    sharp = position[sharp_edges(facets, model.mesh.points)]
+    ends = sharp_edges(facets, model.mesh.points)
+    sharp = position[ends[~joined[ends].all(axis=1)]]
     lines = sum(len(pairs) for _, pairs in swept_parts(model).values())
     if places is None:
         places = int(np.clip(600 // max(lines, 1), 4, 32)) + 1
     s = np.linspace(0.0, 1.0, places)
-    return StructureSurface(component, nodes, eights, polygons, sharp, tuple(_beams(component, s)))
+    beams = tuple(_beams(component, s, joined))
+    return StructureSurface(component, nodes, eights, polygons, sharp, beams, plane)
 
 
-def _beams(component: StructureComponent, s: FloatArray) -> Iterator[tuple[str, PartSurface]]:
-    nobody = np.zeros(len(component.model.mesh.points), dtype=np.bool_)
+def _beams(
+    component: Component, s: FloatArray, joined: BoolArray
+) -> Iterator[tuple[str, PartSurface]]:
     for name, (part, lines) in swept_parts(component.model).items():
         shape = outline(along(part, component.model.mesh, lines, f"part {name!r}", s).section)
-        yield name, PartSurface(np.arange(len(lines)), shape, s, open_ends(lines, nobody))
+        yield name, PartSurface(np.arange(len(lines)), shape, s, open_ends(lines, joined))
 
 
-def drawn_facets(component: StructureComponent) -> dict[str, IntArray]:
+def drawn_facets(component: Component) -> dict[str, IntArray]:
     """The outer faces of solids, or the cells themselves of solids in the plane and of shells."""
     model = component.model
-    flat = [*(model.solids.values() if model.is_plane else ()), *model.shells.values()]
+    flat = [*(model.solids.values() if model.plane else ()), *model.shells.values()]
     found: dict[str, list[IntArray]] = {}
-    for kinds in ({} if model.is_plane else model.facets, *(kinds for _, kinds in flat)):
+    for kinds in ({} if model.plane else model.facets, *(kinds for _, kinds in flat)):
         for kind, cells in kinds.items():
             found.setdefault(kind, []).append(cells)
     return {kind: np.concatenate(blocks) for kind, blocks in found.items()}
@@ -284,10 +347,43 @@ def sharp_edges(facets: dict[str, IntArray], points: FloatArray) -> IntArray:
     return np.asarray(found[found[:, 0] != found[:, 1]], dtype=np.int64)
 
 
-def without_mirror(component: StructureComponent, mirror: str | None) -> None:
-    """Raise ModelError where a mirror is asked for, which only frames have."""
-    if mirror is not None:
+def symmetry_plane(component: Component, name: str) -> tuple[FloatArray, FloatArray]:
+    """Point (3,) and unit normal (3,) of the plane of symmetry that the supports make somewhere."""
+    model = component.model
+    normal = symmetry_normal(model, name)
+    if normal is None:
+        told = "('x', 'rotation') or ('y', 'rotation')" if model.plane else "what fem.symmetry does"
         raise ModelError(
-            f"{component.model.mesh.source}: only frames are drawn with a mirror; a structure is"
-            " drawn as it is"
+            f"{model.mesh.source}: {name!r} is not on a plane of symmetry, where supports hold"
+            f" {told}"
         )
+    return model.mesh.points[model.mesh.nodes(name)[0]], normal
+
+
+def symmetry_normal(model: StructureModel, name: str) -> FloatArray | None:
+    """Unit normal (3,) of the plane of symmetry that the supports at a name make, if they do."""
+    nodes = model.mesh.nodes(name)
+    held = {
+        AXES[axis_index(direction)]
+        for support in model.attached.supports
+        if np.isin(nodes, model.mesh.nodes(support.point)).all()
+        for direction in support.directions
+    }
+    for index, axis in enumerate("xy" if model.plane else "xyz"):
+        mirrored = {axis, *(f"rotation_{other}" for other in "xyz" if other != axis)}
+        if held == (mirrored.intersection(IN_PLANE) if model.plane else mirrored):
+            return np.asarray(np.eye(3)[index])
+    return None
+
+
+def nodes_on(points: FloatArray, plane: tuple[FloatArray, FloatArray] | None) -> BoolArray:
+    """Which points (n, 3) lie on a plane given by a point and a unit normal, shape (n,)."""
+    if plane is None:
+        return np.zeros(len(points), dtype=np.bool_)
+    distance = np.abs((points - plane[0]) @ plane[1])
+    return np.asarray(distance < ON_PLANE * np.linalg.norm(np.ptp(points, axis=0)), dtype=np.bool_)
+
+
+def reflected(points: FloatArray, origin: FloatArray, normal: FloatArray) -> FloatArray:
+    """Points (P, 3) reflected in the plane through a point (3,) with a unit normal (3,)."""
+    return points - 2.0 * ((points - origin) @ normal)[:, None] * normal

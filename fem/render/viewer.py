@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from fem.base.arrays import FloatArray, IntArray
 from fem.render.colouring import colour_name, surface_values
-from fem.render.frame_scenery import StopSphere
 from fem.render.pictures import (
     AUTO_FRACTION,
     BLOCK,
@@ -29,6 +28,7 @@ from fem.render.pictures import (
     surface_of,
     surroundings,
 )
+from fem.render.scenery import StopSphere
 from fem.render.several import Surface
 from fem.render.stop_scenery import SINKING, closing, drawn_radius
 from fem.render.views import view_of_motion
@@ -59,11 +59,11 @@ def surface_data(
     Parameters
     ----------
     component
-        The frame or structure.
+        The structure.
     shapes
         Displacements of the free degrees of freedom, one shape in each column, (N, k).
     mirror
-        A point on a plane of symmetry, to draw half a frame whole.
+        A point on a plane of symmetry, to draw half a structure whole.
     stops
         The stops.
     seen

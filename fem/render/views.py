@@ -18,7 +18,7 @@ VIEWS = {
     "side": (1.0, 0.0, 0.0),
     "isometric": (1.0, 1.0, 1.0),
 }
-"""From where the frame is looked at: y is up, but from the top x is to the right. Beside these
+"""From where the structure is looked at: y is up, but from the top x is to the right. Beside these
 there is `MOTION`, from where what moves is seen best."""
 USUAL = 1.1  # how much better another view must be than that with x to the right and y up
 

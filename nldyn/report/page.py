@@ -62,7 +62,7 @@ class Drawn:
 
     Parameters
     ----------
-    component : fem.Component or fem.StructureComponent
+    component : fem.Component
         Of a mesh.
     reduced : cms.ReducedModel
         What it was reduced to: the modal coordinates are those of the orbits.

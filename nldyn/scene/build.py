@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from nldyn.reduction.selection import ModeSelection
 
 Given = TypeVar("Given")
-AnyComponent = fem.Component | fem.StructureComponent | cms.Matrices
+AnyComponent = fem.Component | cms.Matrices
 logger = logging.getLogger("nldyn")
 LARGE = 20000  # degrees of freedom from which on the factorisation takes seconds
 
@@ -61,7 +61,7 @@ class Structure:
 
     Parameters
     ----------
-    component : fem.Component, fem.StructureComponent or cms.Matrices, optional
+    component : fem.Component or cms.Matrices, optional
         None where the scene gives modes, several components, or matrices that are not reduced.
     reduced : cms.ReducedModel, optional
         None where nothing is reduced.

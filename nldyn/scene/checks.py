@@ -25,28 +25,14 @@ NAMED_BY = (
     "the file has no names; they are physical groups in .msh, arrays 'set:NAME' in .vtu and .vtk,"
     " groups in .med, ELSET and NSET in .inp files, and points may have coordinates in [places]"
 )
-STRUCTURE_ONLY = ("couplings", "foundations")
 MESH_ONLY = (
     *("parts", "supports", "point_masses", "springs", "hinges"),
-    *STRUCTURE_ONLY,
-    *("interfaces", "reduction"),
+    *("couplings", "foundations", "interfaces", "reduction"),
 )
 
 
 class TaggedMesh(Protocol):
-    """What the checks need of a mesh: the names of its parts and of its point sets."""
-
-    @property
-    def parts(self) -> Mapping[str, NDArray[np.int64]]:
-        """Elements of the parts by name."""
-
-    @property
-    def point_sets(self) -> Mapping[str, NDArray[np.int64]]:
-        """Nodes of the point sets by name."""
-
-
-class TaggedStructure(Protocol):
-    """What the checks need of the mesh of a structure: its groups of cells, and all its names."""
+    """What the checks need of a mesh: its groups of cells, and all its names."""
 
     @property
     def groups(self) -> Mapping[str, object]:
@@ -55,6 +41,9 @@ class TaggedStructure(Protocol):
     @property
     def names(self) -> list[str]:
         """All names that stand for nodes."""
+
+    def nodes(self, name: str) -> NDArray[np.int64]:
+        """The nodes of a name."""
 
 
 def check_scene(scene: Scene, file: Path) -> None:
@@ -77,15 +66,13 @@ def check_scene(scene: Scene, file: Path) -> None:
 
 
 def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
-    """Check that the scene and the mesh agree on the names of parts and points."""
+    """Check that the scene and the mesh agree on the names of parts and places."""
     assert scene.mesh is not None
     source = scene.mesh.file
-    what = f"a point set of the mesh {source}"
-    _check_known(scene, mesh.parts, _points_used(scene), mesh.point_sets, what, file)
-    _check_parts_complete(scene, mesh, file)
+    _check_known(scene, mesh, file)
     for key, name in _points_used(scene):
-        count = len(mesh.point_sets[name])
-        if count == 0 or (count > 1 and key[0] != "supports"):
+        count = len(mesh.nodes(name)) if name in mesh.names else 1
+        if count > 1 and key[0] != "supports" and key != ("mesh", "mirror"):
             fault = f"'{name}' must be a single point, but holds {count} nodes of the mesh {source}"
             raise scene_error(file, key, fault)
     _check_interfaces_free(scene, file)
@@ -93,37 +80,24 @@ def check_mesh_names(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
         _check_mirror(scene, scene.mesh.mirror, file)
     for number, hinge in enumerate(scene.hinges):
         key = ("hinges", number, "part")
-        _require(hinge.part, mesh.parts, f"a part of the mesh {source}", file, key)
+        _require(hinge.part, mesh.groups, f"a part of the mesh {source}", file, key)
 
 
-def _check_known(
-    scene: Scene,
-    parts: Mapping[str, object],
-    used: Iterable[tuple[KeyPath, str]],
-    known: Mapping[str, object],
-    what: str,
-    file: Path,
-) -> None:
+def _check_known(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
     """Refuse all names that the mesh does not have: of parts, and of what is used of it."""
     assert scene.mesh is not None
     source = scene.mesh.file
+    known = dict.fromkeys([*mesh.names, *(coupling.at for coupling in scene.couplings)])
+    what = f"a point or face of the mesh {source}, of [places] or of [[couplings]]"
     faults: list[tuple[KeyPath, str]] = []
     for name in scene.parts:
-        if name not in parts:
-            fault = _not_in_mesh(name, parts, f"a part of the mesh {source}")
+        if name not in mesh.groups:
+            fault = _not_in_mesh(name, mesh.groups, f"a part of the mesh {source}")
             faults.append((("parts", name), fault.removeprefix(f"'{name}' ")))
+    used = (*_points_used(scene), *_faces_used(scene))
     faults += [(key, _not_in_mesh(name, known, what)) for key, name in used if name not in known]
     if faults:
         raise scene_error(file, *joined(faults))
-
-
-def check_structure_names(scene: Scene, mesh: TaggedStructure, file: Path) -> None:
-    """Check that the scene of a structure and its mesh agree on the names of parts and places."""
-    assert scene.mesh is not None
-    known = dict.fromkeys([*mesh.names, *(coupling.at for coupling in scene.couplings)])
-    used = (*_points_used(scene), *_faces_used(scene))
-    what = f"a point or face of the mesh {scene.mesh.file}, of [places] or of [[couplings]]"
-    _check_known(scene, mesh.groups, used, known, what, file)
 
 
 def check_computable(scene: Scene, file: Path) -> None:
@@ -239,15 +213,6 @@ def check_ratio_count(scene: Scene, count: int, file: Path) -> None:
         raise scene_error(file, ("damping", "modal_ratio"), fault)
 
 
-def _check_parts_complete(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
-    assert scene.mesh is not None
-    described = [mesh.parts[name] for name in scene.parts]
-    for name, elements in mesh.parts.items():
-        if not np.isin(elements, np.concatenate(described)).all():
-            fault = f"is missing: the mesh {scene.mesh.file} has a part '{name}'"
-            raise scene_error(file, ("parts", name), fault)
-
-
 def _check_interfaces_free(scene: Scene, file: Path) -> None:
     held = {(support.at, direction) for support in scene.supports for direction in support.fixed}
     for name, interface in scene.interfaces.items():
@@ -256,13 +221,21 @@ def _check_interfaces_free(scene: Scene, file: Path) -> None:
             raise scene_error(file, ("interfaces", name, "direction"), fault)
 
 
-def _check_mirror(scene: Scene, point: str, file: Path) -> None:
-    held = {direction for s in scene.supports if s.at == point for direction in s.fixed}
-    if held not in ({"x", "rotation"}, {"y", "rotation"}):
-        fault = (
-            f"'{point}' is not on a plane of symmetry, where [[supports]] fix ['x', 'rotation'] "
-            "or ['y', 'rotation'] and no more"
-        )
+def _check_mirror(scene: Scene, name: str, file: Path) -> None:
+    assert scene.mesh is not None
+    held = {
+        "rotation_z" if d == "rotation" else d
+        for s in scene.supports
+        if s.at == name
+        for d in s.fixed
+    }
+    turns = {axis: {f"rotation_{other}" for other in "xyz" if other != axis} for axis in "xyz"}
+    told = "one of 'x', 'y' and 'z' and the rotations about the other two"
+    if scene.mesh.model == "frame":
+        turns = {"x": {"rotation_z"}, "y": {"rotation_z"}}
+        told = "['x', 'rotation'] or ['y', 'rotation']"
+    if not any(held == {axis, *about} for axis, about in turns.items()):
+        fault = f"'{name}' is not on a plane of symmetry, where [[supports]] fix {told} and no more"
         raise scene_error(file, ("mesh", "mirror"), fault)
 
 
@@ -316,15 +289,9 @@ def _check_structure(scene: Scene, report: Report) -> None:
     for key in ("parts", "interfaces", "reduction"):
         if not getattr(scene, key) and not (key == "parts" and scene.mesh.parts_from_file):
             raise report((key,), "is missing: a mesh needs it")
-    if scene.mesh.model == "structure":
-        if scene.mesh.mirror is not None:
-            raise report(("mesh", "mirror"), "is for frames; a structure is drawn as it is")
-        return
-    for key in STRUCTURE_ONLY:
-        if getattr(scene, key):
-            raise report((key,), "needs [mesh] with model = 'structure'")
     for name, part in scene.parts.items():
-        if part.kind in ("solid", "shell"):
+        in_space = part.kind == "shell" or (part.kind == "solid" and part.plane is None)
+        if in_space and scene.mesh.model == "frame":
             fault = f"'{part.kind}' needs [mesh] with model = 'structure'"
             raise report(("parts", name, "kind"), fault)
 

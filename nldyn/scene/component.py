@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
 
 import fem
 from nldyn.base.errors import SceneError
 from nldyn.base.resources import data_directory
-from nldyn.scene.checks import check_mesh_names, check_structure_names
+from nldyn.scene.checks import check_mesh_names
 from nldyn.scene.contact import with_areas
 from nldyn.scene.described_parts import told_otherwise, with_described_parts
 from nldyn.scene.faults import check_regular, told_as, unreadable
 from nldyn.scene.messages import KeyPath, scene_error
 from nldyn.scene.schema import PartTable, Scene
 
-Mesh = TypeVar("Mesh", fem.FrameMesh, fem.StructureMesh)
-Loaded = TypeVar("Loaded", fem.Component, fem.StructureComponent)
 AXES = ("x", "y", "z")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 
 
-def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.StructureComponent:
+def build_component(scene: Scene, refinement: int = 1) -> fem.Component:
     """Assemble the mesh of a scene.
 
     Parameters
@@ -30,11 +27,11 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
     scene : Scene
         A scene with a ``[mesh]``.
     refinement : int
-        Cut every line of a frame, or of a structure of lines alone, into this many.
+        Cut every line of a structure of lines alone into this many.
 
     Returns
     -------
-    fem.Component or fem.StructureComponent
+    fem.Component
         Sparse stiffness (N/m) and mass (kg), and the interfaces.
 
     Raises
@@ -53,34 +50,22 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component | fem.St
     if scene.mesh is None:
         raise scene_error(scene.file, ("mesh",), "is missing: the structure is not given by a mesh")
     path, ignore = readable_path(scene, scene.mesh.file, ("mesh", "file")), scene.mesh.ignore
-    if scene.mesh.model == "structure":
-        with told_as(scene, ("mesh", "file"), fem.ModelError):
-            structure = fem.read_structure(path, _mesh_places(scene), ignore)
-            structure = _in_metres(scene, structure)
-            if scene.mesh.merge:
-                structure = fem.joined(
-                    [structure], None if scene.mesh.merge is True else scene.mesh.merge
-                )
-        structure = _noted(scene, _with_places(scene, structure))
-        scene = with_described_parts(scene, structure)
-        check_structure_names(scene, structure, scene.file)
-        if refinement > 1:
-            with told_as(scene, ("mesh", "file"), fem.ModelError, hint=": --meshes"):
-                structure = fem.refined(structure, refinement)
-        with told_as(scene, (), fem.ModelError):
-            return _touching(scene, fem.assemble(_structure_model(scene, structure)), refinement)
     with told_as(scene, ("mesh", "file"), fem.ModelError):
         mesh = _in_metres(scene, fem.read_mesh(path, _mesh_places(scene), ignore))
+        if scene.mesh.merge:
+            mesh = fem.joined([mesh], None if scene.mesh.merge is True else scene.mesh.merge)
     mesh = _noted(scene, _with_places(scene, mesh))
     scene = with_described_parts(scene, mesh)
-    check_mesh_names(scene, mesh, scene.file)
-    with told_as(scene, (), fem.ModelError):
-        if refinement > 1:
+    with told_as(scene, ("mesh", "file"), fem.ModelError):
+        check_mesh_names(scene, mesh, scene.file)
+    if refinement > 1:
+        with told_as(scene, ("mesh", "file"), fem.ModelError, hint=": --meshes"):
             mesh = fem.refined(mesh, refinement)
-        return _touching(scene, fem.assemble(_frame_model(scene, mesh)), refinement)
+    with told_as(scene, (), fem.ModelError):
+        return _touching(scene, fem.assemble(_model(scene, mesh)), refinement)
 
 
-def _touching(scene: Scene, component: Loaded, refinement: int) -> Loaded:
+def _touching(scene: Scene, component: fem.Component, refinement: int) -> fem.Component:
     """The component with its load vectors and areas of contact, whose points go with the mesh."""
     if refinement > 1 and any(isinstance(table.at, str) for table in scene.contact_areas):
         fault = "go with the mesh: compare modes or methods, not meshes"
@@ -88,7 +73,7 @@ def _touching(scene: Scene, component: Loaded, refinement: int) -> Loaded:
     return with_areas(scene, _loaded(scene, component))
 
 
-def _loaded(scene: Scene, component: Loaded) -> Loaded:
+def _loaded(scene: Scene, component: fem.Component) -> fem.Component:
     """The component with the load vectors that the excitation acts on."""
     for number, table in enumerate(scene.excitation):
         if table.load is None or table.load in component.interfaces:
@@ -101,7 +86,7 @@ def _loaded(scene: Scene, component: Loaded) -> Loaded:
     return component
 
 
-def _in_metres(scene: Scene, mesh: Mesh) -> Mesh:
+def _in_metres(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureMesh:
     """The mesh with its coordinates in m; what else a file holds cannot be converted."""
     assert scene.mesh is not None
     unit = scene.mesh.unit
@@ -116,7 +101,7 @@ def _in_metres(scene: Scene, mesh: Mesh) -> Mesh:
     return mesh.with_points(METRES[unit] * mesh.points)
 
 
-def _with_places(scene: Scene, mesh: Mesh) -> Mesh:
+def _with_places(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureMesh:
     """The mesh with the point sets of ``[places]``."""
     sets = {}
     for name, place in scene.places.items():
@@ -131,54 +116,38 @@ def _with_places(scene: Scene, mesh: Mesh) -> Mesh:
     return mesh.with_point_sets(sets) if sets else mesh
 
 
-def _noted(scene: Scene, mesh: Mesh) -> Mesh:
+def _noted(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureMesh:
     """The mesh with a note for each part that its file describes otherwise than the scene."""
     said: list[str] = told_otherwise(scene, mesh)
     return replace(mesh, notes=[*mesh.notes, *said]) if said else mesh
 
 
-def _frame_model(scene: Scene, mesh: fem.FrameMesh) -> fem.FrameModel:
-    parts = {
-        name: _truss(table) if table.kind == "truss" else _beam(table)
-        for name, table in scene.parts.items()
-    }
-    separate = scene.mesh is not None and scene.mesh.separate
-    return fem.FrameModel(mesh, parts, separate=separate, **_attached(scene))
-
-
-def _structure_model(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureModel:
+def _model(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureModel:
+    assert scene.mesh is not None
     return fem.StructureModel(
         mesh,
         parts={name: _part(table) for name, table in scene.parts.items()},
+        supports=[fem.Support(s.at, tuple(s.fixed)) for s in scene.supports],
+        point_masses=[
+            fem.PointMass(m.at, m.mass, m.rotary_inertia, m.offset or (0.0, 0.0, 0.0))
+            for m in scene.point_masses
+        ],
+        springs=[
+            fem.PointSpring(s.at, s.direction, s.stiffness)
+            for s in scene.mesh_springs.values()
+            if s.direction is not None and s.stiffness is not None
+        ],
+        hinges=[fem.Hinge(h.at, h.part) for h in scene.hinges],
         couplings=[
             fem.Coupling(c.at, c.face, c.kind, c.place, tuple(c.directions))
             for c in scene.couplings
         ],
         foundations=[fem.Foundation(f.at, f.stiffness) for f in scene.foundations],
-        separate=scene.mesh is not None and scene.mesh.separate,
-        pinned=scene.mesh.pinned if scene.mesh is not None else (),
-        **_attached(scene),
+        interfaces={name: fem.Interface(i.at, i.direction) for name, i in scene.interfaces.items()},
+        separate=scene.mesh.separate,
+        pinned=scene.mesh.pinned,
+        plane=scene.mesh.model == "frame",
     )
-
-
-def _attached(scene: Scene) -> dict[str, Any]:
-    """What holds, loads and joins the points of a frame or a structure."""
-    return {
-        "supports": [fem.Support(s.at, tuple(s.fixed)) for s in scene.supports],
-        "point_masses": [
-            fem.PointMass(m.at, m.mass, m.rotary_inertia, m.offset or (0.0, 0.0, 0.0))
-            for m in scene.point_masses
-        ],
-        "springs": [
-            fem.PointSpring(s.at, s.direction, s.stiffness)
-            for s in scene.mesh_springs.values()
-            if s.direction is not None and s.stiffness is not None
-        ],
-        "hinges": [fem.Hinge(h.at, h.part) for h in scene.hinges],
-        "interfaces": {
-            name: fem.Interface(i.at, i.direction) for name, i in scene.interfaces.items()
-        },
-    }
 
 
 def _truss(table: PartTable) -> fem.TrussPart:

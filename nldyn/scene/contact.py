@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from nldyn.scene.schema import ContactAreaTable, Scene
 from nldyn.system.contact_area import contact_area, gap_beside
 from nldyn.system.stop import Stop
 
-Loaded = TypeVar("Loaded", fem.Component, fem.StructureComponent)
 SIDES = ("", " against", " along", " along against")
 
 
@@ -48,7 +46,7 @@ class Found:
     held: int = 0
 
 
-def with_areas(scene: Scene, component: Loaded) -> Loaded:
+def with_areas(scene: Scene, component: fem.Component) -> fem.Component:
     """The component with the interfaces of the areas of contact of its scene.
 
     Raises
@@ -97,7 +95,7 @@ def _as_gaps(gap: float | list[float]) -> Real | float:
     return np.array(gap) if isinstance(gap, list) else gap
 
 
-def _placed(component: Loaded, table: ContactAreaTable) -> tuple[Found, dict[str, Real]]:
+def _placed(component: fem.Component, table: ContactAreaTable) -> tuple[Found, dict[str, Real]]:
     """The points of an area of a mesh, and the load vectors of their interfaces."""
     assert isinstance(table.at, str) and table.direction is not None
     points = fem.contact_points(

@@ -67,11 +67,12 @@ class MeshTable(Table):
     `.inp`, Nastran `.bdf` or `.dat`. A path that is not absolute is relative to the folder of
     the scene file; where it may lead is [told below](#a-scene-is-data)."""
     model: Literal["frame", "structure"] = "frame"
-    """`"frame"`: the lines of the mesh are a frame in a plane z = constant. `"structure"`:
-    solids, shells and beams in space or in the plane, see [structures.md](structures.md)."""
+    """`"frame"`: everything lies and moves in a plane z = constant, most often beams.
+    `"structure"`: solids, shells and beams in space, see [structures.md](structures.md); plane
+    solids make it lie in the plane, too."""
     mirror: str | None = None
-    """Of a frame: point on the plane of symmetry of a half model. `nldyn render` then draws the
-    whole structure; nothing else changes. Not in a component of several."""
+    """Point or face on the plane of symmetry of a half model. `nldyn render` then draws the whole
+    structure; nothing else changes. Not in a component of several."""
     parts_from_file: list[str] | Literal["all"] = []
     """Names of parts whose material and section are taken from the file of Abaqus or CalculiX, see
     [decks.md](decks.md), or of [Nastran](nastran.md); they are not in `[parts]`. `"all"`: all
@@ -85,7 +86,7 @@ class MeshTable(Table):
     Abaqus such as `"S4R"`, or `"ungrouped"` for the cells in no group. `nldyn check` tells how
     many."""
     merge: bool | Positive = False
-    """[m] Of a structure: make nodes at one place one node; `true` for within 1e-9 of the size
+    """[m] Make nodes at one place one node; `true` for within 1e-9 of the size
     of the mesh, or a distance. `nldyn check` tells how many and how far apart they were.
     Springs between nodes that become one are refused."""
     separate: bool = False
@@ -93,16 +94,13 @@ class MeshTable(Table):
     same nodes, are meant. Else pieces that touch so and cells that hang are refused, and slits
     within a piece told."""
     pinned: list[str] = []
-    """Of a structure: names of parts that are meant to meet solids in nodes or edges, about
+    """Names of parts that are meant to meet solids in nodes or edges, about
     which they turn. Of others `nldyn check` tells."""
 
     @model_validator(mode="after")
     def _one_mesh(self) -> MeshTable:
         if self.merge and self.separate:
             raise ValueError("has both 'merge' and 'separate'; keep one")
-        for key in ("merge", "pinned"):
-            if getattr(self, key) and self.model == "frame":
-                raise ValueError(f"has '{key}', which needs model = \"structure\"")
         return self
 
 

@@ -81,10 +81,10 @@ def write_bracket(edge: float, path: Path) -> None:
         gmsh.write(str(path))
 
 
-def assembled(path: Path) -> fem.StructureComponent:
+def assembled(path: Path) -> fem.Component:
     """The bracket of a mesh file, clamped at its foot."""
     model = fem.StructureModel(
-        fem.read_structure(path),
+        fem.read_mesh(path),
         {"bracket": fem.SolidPart(STEEL)},
         [fem.Support("foot", ("x", "y", "z"))],
     )

@@ -9,10 +9,10 @@ import numpy as np
 from hypothesis import HealthCheck, settings
 
 import fem
-from fem.mesh.structure_mesh import box_mesh, joined, structure_mesh
+from fem.mesh.structure_mesh import box_mesh, joined
 
 
-def frame() -> fem.FrameMesh:
+def frame() -> fem.StructureMesh:
     """An arm on a leg with a brace to a wall."""
     points = {"foot": (0, 0), "corner": (0, 0.5), "tip": (1, 0.5), "wall": (-0.5, 0)}
     members = [("leg", "foot", "corner", 2), ("arm", "corner", "tip", 3),
@@ -26,7 +26,7 @@ def block() -> fem.StructureMesh:
     middle = np.flatnonzero(np.isclose(solid.points[:, 0], 0.1))
     solid = solid.with_point_sets({"middle": middle})
     rod = fem.frame_mesh({"root": (0.25, 0, 0), "tip": (0.45, 0, 0)}, [("rod", "root", "tip", 2)])
-    return joined([solid, structure_mesh(rod)])
+    return joined([solid, rod])
 
 
 def write_meshes(folder: Path) -> None:

@@ -122,7 +122,7 @@ def test_an_included_file_is_in_the_folder_of_the_mesh_or_an_allowed_one(project
     assert refusal(command("check", file, "--mesh-folder", project / "meshes")) is None
     with pytest.raises(fem.ModelError, match="not allowed"):
         fem.read_mesh(deck)
-    assert len(fem.read_mesh(deck, [project / "meshes"]).lines) == 6
+    assert len(fem.read_mesh(deck, [project / "meshes"]).cells["line"]) == 6
 
 
 def test_results_go_nowhere_but_into_the_folder_asked_for(tmp_path, monkeypatch):

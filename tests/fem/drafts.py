@@ -75,7 +75,7 @@ class Draft:
         centre = corners.mean(axis=0)
         return abs(sum(_cone(corners[list(face)] - centre) for face in FACES[kind]))
 
-    def mesh(self) -> fem.StructureMesh | fem.FrameMesh:
+    def mesh(self) -> fem.StructureMesh:
         """The mesh in memory."""
         place = {label: i for i, label in enumerate(self.nodes)}
         kinds: dict[str, list[Label]] = {}
@@ -99,20 +99,9 @@ class Draft:
             masses.append(fem.PointMass(f"node {node}", kg))
         brought = Attachments(masses)
         points = np.array(list(self.nodes.values()))
-        if self.model != "frame":
-            return fem.StructureMesh(points, cells, groups, sets, "draft", (), brought)
-        used, lines = np.unique(cells["line"], return_inverse=True)
-        number = {int(node): i for i, node in enumerate(used)}
-        return fem.FrameMesh(
-            points[used],
-            lines.reshape(-1, 2),
-            {name: group["line"] for name, group in groups.items()},
-            {name: [number[n] for n in nodes if n in number] for name, nodes in sets.items()},
-            "draft",
-            brought,
-        )
+        return fem.StructureMesh(points, cells, groups, sets, "draft", (), brought)
 
-    def assembled(self, mesh: fem.StructureMesh | fem.FrameMesh):
+    def assembled(self, mesh: fem.StructureMesh):
         """The component of a mesh with the parts and places of this draft."""
         materials = {n: fem.Material(2e11, density, 0.3) for n, density in self.densities.items()}
         at_tip = {"tip": fem.Interface(self.seen, "x")}
@@ -120,7 +109,9 @@ class Draft:
             section = fem.RectangularSection(0.01, 0.02)
             beams = {name: fem.BeamPart(material, section) for name, material in materials.items()}
             held = [fem.Support(self.held, ("x", "y", "rotation"))]
-            return fem.assemble(fem.FrameModel(mesh, beams, held, interfaces=at_tip))
+            return fem.assemble(
+                fem.StructureModel(mesh, beams, held, interfaces=at_tip, plane=True)
+            )
         if self.model == "shell":
             parts = {n: fem.ShellPart(material, 0.01) for n, material in materials.items()}
             held = [fem.Support(self.held, CLAMP)]

@@ -30,7 +30,7 @@ def beam(length=1.0, elements=16, angle=0.0, **rest):
     """A straight beam from point "left" to point "right"."""
     end = (length * np.cos(angle), length * np.sin(angle))
     mesh = fem.frame_mesh({"left": (0.0, 0.0), "right": end}, [("bar", "left", "right", elements)])
-    return fem.FrameModel(mesh, {"bar": BAR}, **rest)
+    return fem.StructureModel(mesh, {"bar": BAR}, **rest, plane=True)
 
 
 def bending_hz(root, length=1.0):

@@ -32,7 +32,7 @@ FIRST_ORDER = ("hexahedron", "wedge", "tetra", "pyramid")
 class Body:
     """An assembled part on the image of a square or a cube, and where its nodes were there."""
 
-    component: fem.StructureComponent
+    component: fem.Component
     at: np.ndarray
     shell: bool
 

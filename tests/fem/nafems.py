@@ -52,10 +52,11 @@ def double_cross():
     mesh = fem.frame_mesh(
         {"middle": (0.0, 0.0), **ends}, [("arms", "middle", end, 8) for end in ends]
     )
-    return fem.FrameModel(
+    return fem.StructureModel(
         mesh,
         {"arms": fem.BeamPart(STEEL, fem.RectangularSection(0.125, 0.125))},
         supports=[fem.Support(end, ("x", "y")) for end in ends],
+        plane=True,
     )
 
 
@@ -78,7 +79,7 @@ def square_frame():
     corners = {"a": (0, 0, 0), "b": (10, 0, 0), "c": (10, 10, 0), "d": (0, 10, 0)}
     bars = [("bars", p, q, 8) for p, q in ("ab", "bc", "cd", "da")]
     section = fem.BeamPart(STEEL, fem.RectangularSection(0.25, 0.25))
-    return fem.FrameModel(fem.frame_mesh(corners, bars), {"bars": section})
+    return fem.StructureModel(fem.frame_mesh(corners, bars), {"bars": section}, plane=True)
 
 
 def deep_beam():

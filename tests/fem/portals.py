@@ -34,10 +34,11 @@ def portal(elements, turn=0.0, shift=(0.0, 0.0), part=BAR):
             ("post", "c", "d", elements),
         ],
     )
-    return fem.FrameModel(
+    return fem.StructureModel(
         mesh,
         {"post": part, "girder": part},
         supports=[fem.Support("a", CLAMP), fem.Support("d", CLAMP)],
+        plane=True,
     )
 
 

@@ -19,7 +19,7 @@ MODULES = [
     for path in sorted((ROOT / "fem").rglob("*.py"))
     if ">>> " in path.read_text(encoding="utf-8")
 ]
-DRAWING = {f"fem.render.{name}" for name in ("gl", "frame_surface", "frame_scenery", "pictures")}
+DRAWING = {f"fem.render.{name}" for name in ("gl", "pictures")}
 TEXT = (ROOT / "docs" / "reference" / "fem.md").read_text(encoding="utf-8")
 
 

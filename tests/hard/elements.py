@@ -35,7 +35,7 @@ ROUNDING = "of what the rounding of the stiffness matrix costs: 2^-53 times its 
 ROOT = "of what the root of the condition leaves of double precision"
 
 
-def cantilever(thickness: float, cells: int = CELLS) -> fem.StructureComponent:
+def cantilever(thickness: float, cells: int = CELLS) -> fem.Component:
     """A strip of 1 m by 50 mm in one layer of second-order cells, clamped at one end."""
     mesh = fem.box_mesh("strip", (1.0, 0.05, thickness), (cells, 1, 1))
     model = fem.StructureModel(
@@ -48,7 +48,7 @@ def cantilever(thickness: float, cells: int = CELLS) -> fem.StructureComponent:
     return fem.assemble(model)
 
 
-def flexibility_error(component: fem.StructureComponent, name: str, exact: float) -> Measured:
+def flexibility_error(component: fem.Component, name: str, exact: float) -> Measured:
     """Error of a flexibility, in roundings 2^-53 of the stiffness matrix times its condition."""
     load, K = component.interfaces[name], component.stiffness.tocsc()
     off = abs(float(load @ spsolve(K, load)) / exact - 1.0)
@@ -56,7 +56,7 @@ def flexibility_error(component: fem.StructureComponent, name: str, exact: float
     return Measured(off / (2.0**-53 * cost), f"relative error {off:.1e}, condition {cost:.0e}")
 
 
-def condition(component: fem.StructureComponent) -> float:
+def condition(component: fem.Component) -> float:
     """Largest over smallest eigenvalue of the stiffness matrix."""
     K = component.stiffness.tocsc()
     largest, smallest = (
@@ -89,11 +89,12 @@ def fine_beam_error(count: int) -> Measured:
     """
     mesh = fem.frame_mesh({"a": (0.0, 0.0), "b": (2.0, 0.0)}, [("beam", "a", "b", count)])
     section = fem.RectangularSection(0.1, 0.05)
-    model = fem.FrameModel(
+    model = fem.StructureModel(
         mesh,
         parts={"beam": fem.BeamPart(STEEL, section)},
         supports=[fem.Support("a", ("x", "y")), fem.Support("b", ("x", "y"))],
         interfaces={"end": fem.Interface("a", "rotation")},
+        plane=True,
     )
     found = cms.reduce(fem.assemble(model), modes=3).frequencies_hz[:3]
     mass, bending = STEEL.density * section.area, STEEL.youngs_modulus * section.second_moment

@@ -28,11 +28,12 @@ def beam(count, held=PINNED, scale=1.0):
     part = fem.BeamPart(fem.Material(E / scale**2, RHO / scale**4, 0.3), section)
     free = "y" if held is GUIDED else "rotation"
     return fem.assemble(
-        fem.FrameModel(
+        fem.StructureModel(
             mesh,
             parts={"p": part},
             supports=[fem.Support(point, directions) for point, directions in held],
             interfaces={"end": fem.Interface("a", free)},
+            plane=True,
         )
     )
 
@@ -178,11 +179,12 @@ def test_a_loose_piece_moves_rigidly_beside_a_held_one(modes):
     mesh = fem.frame_mesh(points, [("held", "foot", "tip", 3), ("loose", "from", "to", 3)])
     part = fem.BeamPart(fem.Material(E, RHO, 0.3), fem.RectangularSection(WIDTH, HEIGHT))
     component = fem.assemble(
-        fem.FrameModel(
+        fem.StructureModel(
             mesh,
             parts={"held": part, "loose": part},
             supports=[fem.Support("foot", ("x", "y", "rotation"))],
             interfaces={name: fem.Interface("tip", name) for name in ("x", "y")},
+            plane=True,
         )
     )
     reduced = cms.reduce(component, modes=modes, method="craig-bampton", unseen=True)

@@ -24,7 +24,7 @@ def half_beam():
     numbers = tomllib.loads((MESHES / "half_beam.toml").read_text())
     section = fem.RectangularSection
     return fem.assemble(
-        fem.FrameModel(
+        fem.StructureModel(
             fem.read_mesh(MESHES / "half_beam.msh"),
             parts={
                 "beam": fem.BeamPart(fem.Material(2.1e11, 7746.0), section(0.09, 0.01)),
@@ -36,6 +36,7 @@ def half_beam():
             ],
             point_masses=[fem.PointMass("middle", numbers["middle_mass"] / 2)],
             interfaces={"middle": fem.Interface("middle", "y")},
+            plane=True,
         )
     )
 

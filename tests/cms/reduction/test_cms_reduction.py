@@ -283,11 +283,12 @@ def portal_frame(size):
         "right": fem.RectangularSection(0.01, 0.01),
     }
     component = fem.assemble(
-        fem.FrameModel(
+        fem.StructureModel(
             mesh,
             parts={name: fem.BeamPart(steel, section) for name, section in sections.items()},
             supports=[fem.Support("a", ("x", "y", "rotation")), fem.Support("d", ("x", "y"))],
             interfaces={"b": fem.Interface("b", "x")},
+            plane=True,
         )
     )
     assert component.stiffness.shape == (size, size)

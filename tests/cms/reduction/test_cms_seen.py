@@ -29,14 +29,15 @@ def beam():
 def cantilevers(width):
     part = fem.BeamPart(STEEL, fem.RectangularSection(width, HEIGHT))
     line = fem.frame_mesh({"root": (0, 0), "tip": (LENGTH, 0)}, [("beam", "root", "tip", COUNT)])
-    flat = fem.FrameModel(
+    flat = fem.StructureModel(
         line,
         {"beam": part},
         supports=[fem.Support("root", ("x", "y", "rotation"))],
         interfaces={"tip": fem.Interface("tip", "y")},
+        plane=True,
     )
     ends = {"root": (0, 0, 0), "tip": (LENGTH, 0, 0)}
-    mesh = fem.structure_mesh(fem.frame_mesh(ends, [("beam", "root", "tip", COUNT)]))
+    mesh = fem.frame_mesh(ends, [("beam", "root", "tip", COUNT)])
     turns = tuple(f"rotation_{axis}" for axis in "xyz")
     solid = fem.StructureModel(
         mesh,

@@ -7,7 +7,6 @@ from scipy.sparse.linalg import spsolve
 import fem
 from fem.assembly.contact import rule
 from fem.mesh.cells import KINDS
-from fem.mesh.structure_mesh import structure_mesh
 
 STEEL = fem.Material(2e11, 7800.0, 0.3)
 BEAM = fem.BeamPart(STEEL, fem.RectangularSection(0.02, 0.01))
@@ -19,12 +18,13 @@ def line(count=4):
 
 def clamped_frame(**more):
     return fem.assemble(
-        fem.FrameModel(
+        fem.StructureModel(
             line(),
             parts={"arm": BEAM},
             supports=[fem.Support("root", ("x", "y", "rotation"))],
             interfaces={"tip": fem.Interface("tip", "y")},
             **more,
+            plane=True,
         )
     )
 
@@ -59,7 +59,7 @@ def test_beams_of_a_structure_are_those_of_a_frame():
     frame = fem.contact_points(flat, "arm", "-y", points=2, surface=0.05)
     arm = fem.assemble(
         fem.StructureModel(
-            structure_mesh(line()),
+            line(),
             {"arm": BEAM},
             supports=[fem.Support("root", ("x", "y", "z", *(f"rotation_{a}" for a in "xyz")))],
             interfaces={"tip": fem.Interface("tip", "y")},
@@ -116,7 +116,7 @@ def test_rules_of_facets_have_positive_weights(kind, points):
 def test_what_makes_no_area_is_refused_in_a_sentence():
     arm, body = clamped_frame(), block()
     for component, at, direction, more, said in (
-        (arm, "tip", "y", {}, "no beam has all its nodes in it"),
+        (arm, "tip", "y", {}, "no outer face, edge or beam whose nodes are all in it"),
         (arm, "arm", "up", {}, "direction must be"),
         (arm, "arm", (0.0, 0.0, 0.0), {}, "direction must be"),
         (arm, "arm", "y", {"points": 0}, "points must be"),

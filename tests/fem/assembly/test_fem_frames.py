@@ -60,10 +60,11 @@ def test_a_frame_of_another_size_has_frequencies_of_one_over_the_size(scale):
     model = portal(4)
     section = fem.RectangularSection(scale * 0.03, scale * 0.02)
     part = fem.BeamPart(BAR.material, section)
-    scaled = fem.FrameModel(
+    scaled = fem.StructureModel(
         model.mesh.with_points(scale * model.mesh.points),
         {"post": part, "girder": part},
         supports=model.supports,
+        plane=True,
     )
     found = frequencies_hz(fem.assemble(scaled), 8)
     assert found == pytest.approx(REFERENCE / scale, rel=1e-10)
@@ -74,18 +75,20 @@ def test_order_and_direction_of_elements_change_no_frequency(seed):
     random = np.random.default_rng(seed)
     mesh = portal(4).mesh
     nodes = random.permutation(len(mesh.points))
-    order = random.permutation(len(mesh.lines))
+    order = random.permutation(len(mesh.cells["line"]))
     place, back = np.argsort(nodes), np.argsort(order)
-    lines = place[mesh.lines[order]]
+    lines = place[mesh.cells["line"][order]]
     flipped = random.random(len(lines)) < 0.5
     lines[flipped] = lines[flipped][:, ::-1]
-    shuffled = fem.FrameMesh(
+    shuffled = fem.StructureMesh(
         mesh.points[nodes],
-        lines,
-        {name: back[part] for name, part in mesh.parts.items()},
+        {"line": lines},
+        {name: {"line": back[group["line"]]} for name, group in mesh.groups.items()},
         {name: place[point] for name, point in mesh.point_sets.items()},
     )
-    model = fem.FrameModel(shuffled, {"post": BAR, "girder": BAR}, supports=portal(4).supports)
+    model = fem.StructureModel(
+        shuffled, {"post": BAR, "girder": BAR}, supports=portal(4).supports, plane=True
+    )
     assert frequencies_hz(fem.assemble(model), 8) == pytest.approx(REFERENCE, rel=1e-10)
 
 
@@ -157,4 +160,4 @@ def test_shipped_meshes_are_those_of_the_calibrated_dimensions():
     ):
         read = fem.read_mesh(make_meshes.HERE / name)
         assert np.array_equal(read.points, made.points)
-        assert np.array_equal(read.lines, made.lines)
+        assert np.array_equal(read.cells["line"], made.cells["line"])

@@ -22,7 +22,7 @@ def frame(dimensions):
 
 
 def solid(dimensions, poissons_ratio):
-    mesh = fem.read_structure(make_meshes.HERE / "half_beam_solid.vtu")
+    mesh = fem.read_mesh(make_meshes.HERE / "half_beam_solid.vtu")
     model = make_meshes.solid_half_beam_model(mesh, dimensions.middle_mass, poissons_ratio)
     return fem.assemble(model)
 
@@ -34,7 +34,7 @@ def solids(dimensions):
 
 def test_the_mesh_is_what_the_script_makes(dimensions):
     made = make_meshes.solid_half_beam_mesh(dimensions)
-    read = fem.read_structure(make_meshes.HERE / "half_beam_solid.vtu")
+    read = fem.read_mesh(make_meshes.HERE / "half_beam_solid.vtu")
     np.testing.assert_allclose(read.points, made.points, atol=1e-15)
     for kind, cells in made.cells.items():
         assert np.array_equal(read.cells[kind], cells)

@@ -159,7 +159,10 @@ def test_the_torsion_constant_of_a_rectangle_is_the_published_one():
         assert found == pytest.approx(published, abs=6e-4)
 
 
-def test_a_frame_in_its_plane_is_the_same_as_a_structure():
+@pytest.mark.parametrize(
+    "placed", [{}, {"offset": (0.02, 0.0)}, {"orientation": (0.3, 0.1, 1.0), "offset": (0.0, 0.02)}]
+)
+def test_a_frame_in_its_plane_is_the_same_as_a_structure(placed):
     mesh = fem.frame_mesh(
         {"a": (0, 0), "b": (0, 1), "c": (1, 1.3), "d": (1.2, 0)},
         [("bars", "a", "b", 3), ("bars", "b", "c", 3), ("bars", "c", "d", 3)],
@@ -169,10 +172,10 @@ def test_a_frame_in_its_plane_is_the_same_as_a_structure():
         "point_masses": [fem.PointMass("b", 0.3, 0.01)],
         "springs": [fem.PointSpring("c", "x", 1e5), fem.PointSpring("c", "rotation", 1e3)],
     }
-    part = fem.BeamPart(STEEL, BAR.section, theory="timoshenko", axial_force=500.0)
-    frame = fem.assemble(fem.FrameModel(mesh, {"bars": part}, supports, **attached))
+    part = fem.BeamPart(STEEL, BAR.section, theory="timoshenko", axial_force=500.0, **placed)
+    frame = fem.assemble(fem.StructureModel(mesh, {"bars": part}, supports, **attached, plane=True))
     nodes = np.arange(len(mesh.points))
-    flat = fem.structure_mesh(mesh).with_point_sets({"all": nodes})
+    flat = mesh.with_point_sets({"all": nodes})
     out = fem.Support("all", ("z", "rotation_x", "rotation_y"))
     space = fem.assemble(fem.StructureModel(flat, {"bars": part}, [*supports, out], **attached))
     np.testing.assert_allclose(lowest_hz(space, 8), lowest_hz(frame, 8), rtol=1e-9)
@@ -217,7 +220,7 @@ def test_a_deep_beam_converges_to_timoshenko():
     for elements in (4, 8, 16):
         mesh = fem.frame_mesh({"a": (0, 0), "b": (10, 0)}, [("beam", "a", "b", elements)])
         ends = [fem.Support("a", ("x", "y")), fem.Support("b", "y")]
-        component = fem.assemble(fem.FrameModel(mesh, {"beam": part}, ends))
+        component = fem.assemble(fem.StructureModel(mesh, {"beam": part}, ends, plane=True))
         errors.append(lowest_hz(component, 1)[0] / timoshenko_hz(part, 10.0, 1) - 1)
     assert 0 < errors[-1] < 2e-4
     assert errors[0] / errors[1] > 3.8 and errors[1] / errors[2] > 3.8
@@ -231,20 +234,22 @@ def test_an_axial_force_changes_the_frequency_of_a_pinned_beam_as_in_the_closed_
 
     def first(force):
         part = fem.BeamPart(STEEL, BAR.section, axial_force=force)
-        return lowest_hz(fem.assemble(fem.FrameModel(mesh, {"bar": part}, ends)), 1)[0]
+        return lowest_hz(
+            fem.assemble(fem.StructureModel(mesh, {"bar": part}, ends, plane=True)), 1
+        )[0]
 
     assert first(share * euler) / first(0.0) == pytest.approx(np.sqrt(1 + share), rel=1e-5)
 
 
 def test_two_eccentric_bars_bend_as_one_section():
     mesh = fem.frame_mesh({"root": (0, 0, 0), "tip": (1, 0, 0)}, [("low", "root", "tip", 30)])
-    lines = fem.structure_mesh(mesh)
-    count = len(mesh.lines)
+    lines = mesh.cells["line"]
+    count = len(lines)
     both = fem.StructureMesh(
-        lines.points,
-        {"line": np.vstack([mesh.lines, mesh.lines])},
+        mesh.points,
+        {"line": np.vstack([lines, lines])},
         {"low": {"line": np.arange(count)}, "high": {"line": np.arange(count, 2 * count)}},
-        lines.point_sets,
+        mesh.point_sets,
     )
     away = 0.05
     parts = {
@@ -266,9 +271,7 @@ def test_two_eccentric_bars_bend_as_one_section():
 def test_a_mass_with_an_offset_is_a_mass_on_a_rigid_arm():
     heavy = fem.PointMass("tip", 3.0, (0.02, 0.03, 0.05), offset=(0.2, -0.1, 0.3))
     offset = fem.assemble(cantilever(BAR, point_masses=[heavy]))
-    mesh = fem.structure_mesh(
-        fem.frame_mesh({"root": (0, 0, 0), "tip": (1, 0, 0)}, [("arm", "root", "tip", 4)])
-    )
+    mesh = fem.frame_mesh({"root": (0, 0, 0), "tip": (1, 0, 0)}, [("arm", "root", "tip", 4)])
     arm = fem.StructureModel(
         mesh,
         {"arm": BAR},
@@ -316,9 +319,7 @@ def test_a_beam_goes_on_where_the_solid_ends():
     solid = fem.box_mesh("solid", (0.5, 0.02, 0.03), (10, 1, 1))
     points = solid.points - np.array([0.0, 0.01, 0.015])
     solid = solid.with_points(points)
-    beam = fem.structure_mesh(
-        fem.frame_mesh({"joint": (0.5, 0, 0), "tip": (1, 0, 0)}, [("beam", "joint", "tip", 8)])
-    )
+    beam = fem.frame_mesh({"joint": (0.5, 0, 0), "tip": (1, 0, 0)}, [("beam", "joint", "tip", 8)])
     part = fem.BeamPart(NO_CONTRACTION, BAR.section, theory="timoshenko")
     count = len(solid.points)
     mixed = fem.StructureMesh(
@@ -519,9 +520,7 @@ def test_a_structure_is_saved_and_loaded(tmp_path):
     )
     component = fem.assemble(model)
     component.save(tmp_path / "bar.npz")
-    again = fem.StructureComponent.load(tmp_path / "bar.npz")
+    again = fem.Component.load(tmp_path / "bar.npz")
     assert abs(again.stiffness - component.stiffness).max() == 0.0
     assert abs(again.mass - component.mass).max() == 0.0
     assert all((again.interfaces[n] == v).all() for n, v in component.interfaces.items())
-    with pytest.raises(fem.ModelError, match="is not a file of a saved frame"):
-        fem.Component.load(tmp_path / "bar.npz")

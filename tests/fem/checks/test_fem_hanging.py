@@ -147,7 +147,7 @@ def test_a_mesh_of_gmsh_in_which_sizes_change_is_let_be(order, tmp_path):
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(order)
         gmsh.write(str(tmp_path / "body.msh"))
-    model = model_of(fem.read_structure(tmp_path / "body.msh"), fem.SolidPart(STEEL))
+    model = model_of(fem.read_mesh(tmp_path / "body.msh"), fem.SolidPart(STEEL))
     check_nothing_hangs(model, boundary(model))
     assert not list(overlap_warnings(model, boundary(model)))
 
@@ -195,7 +195,7 @@ def rod_on_block(inner=None, couplings=(), pinned=()):
     if inner is not None:
         ends["inner"] = (inner, 0.5, 0.5)
         members.append(("rod", "inner", "face", 1))
-    rod = fem.structure_mesh(fem.frame_mesh(ends, members))
+    rod = fem.frame_mesh(ends, members)
     return fem.StructureModel(
         fem.joined([block, rod]),
         {
@@ -238,7 +238,7 @@ def test_a_joint_that_is_meant_is_not_told_of(tmp_path):
         meant = fem.assemble(rod_on_block(pinned=["rod"]))
     assert lowest_hz(meant, 3)[2] < 0.1
     meant.save(tmp_path / "rod.npz")
-    assert fem.StructureComponent.load(tmp_path / "rod.npz").model.pinned == ("rod",)
+    assert fem.Component.load(tmp_path / "rod.npz").model.pinned == ("rod",)
     with pytest.raises(fem.ModelError, match="'rods' of 'pinned' is no part; there are 'block', "):
         rod_on_block(pinned=["rods"])
     with pytest.raises(fem.ModelError, match="'rod' of 'pinned' meets no solid in nodes that it"):

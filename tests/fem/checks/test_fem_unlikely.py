@@ -81,7 +81,7 @@ def test_wedges_a_mass_and_a_shell_are_all_in_the_frequency(tmp_path):
     node = int(mesh.point_sets["tip"][0]) + 1
     with path.open("a") as file:
         file.write(f"*ELEMENT, TYPE=MASS, ELSET=LUMP\n9999, {node}\n*MASS, ELSET=LUMP\n{LUMP}\n")
-    whole = fem.assemble(model(fem.read_structure(path), skin=True))
+    whole = fem.assemble(model(fem.read_mesh(path), skin=True))
     skin_mass = LENGTH * WIDTH * SKIN * ALUMINIUM.density
     body_mass = LENGTH * WIDTH * HEIGHT * STEEL.density
     assert fem.mass_properties(whole).mass == pytest.approx(body_mass + skin_mass + LUMP)
@@ -130,7 +130,9 @@ def test_a_beam_that_is_thicker_than_long_is_told():
     frame = fem.frame_mesh({"a": (0, 0), "b": (0.4, 0)}, [("arm", "a", "b", 2)])
     arm = {"arm": fem.BeamPart(STEEL, fem.RectangularSection(40.0, 20.0))}  # in mm
     with pytest.warns(fem.UnlikelyWarning, match=r"'arm' is 28.3 m thick and in all as"):
-        fem.assemble(fem.FrameModel(frame, arm, [fem.Support("a", ("x", "y", "rotation"))]))
+        fem.assemble(
+            fem.StructureModel(frame, arm, [fem.Support("a", ("x", "y", "rotation"))], plane=True)
+        )
 
 
 def test_beams_along_others_are_told_and_those_in_line_are_not():
@@ -139,10 +141,10 @@ def test_beams_along_others_are_told_and_those_in_line_are_not():
     part = fem.BeamPart(fem.Material(2.1e11, 7800.0), fem.RectangularSection(0.02, 0.01))
     with warnings.catch_warnings():
         warnings.simplefilter("error", fem.UnlikelyWarning)
-        fem.assemble(fem.FrameModel(fem.frame_mesh(points, members), {"bar": part}))
+        fem.assemble(fem.StructureModel(fem.frame_mesh(points, members), {"bar": part}, plane=True))
     mesh = fem.frame_mesh(points, [*members, ("bar", "a", "b", 1)])
     with pytest.warns(fem.UnlikelyWarning, match=r"beams lie upon others \(2 times; .* at \(0, 0"):
-        frame = fem.assemble(fem.FrameModel(mesh, {"bar": part}))
+        frame = fem.assemble(fem.StructureModel(mesh, {"bar": part}, plane=True))
     assert fem.mass_properties(frame).mass == pytest.approx(7800.0 * 2e-4 * 3.0)  # 1 m twice
 
 
@@ -153,7 +155,7 @@ def test_facets_of_shells_upon_others_are_told_and_walls_at_a_fold_are_not():
     def shell(*blocks):
         sets = {"wall": [np.arange(len(cells)) for _, cells in blocks]}
         content = meshio.Mesh(corners, list(blocks), cell_sets=sets)
-        return fem.assemble(fem.StructureModel(fem.structure_from_meshio(content), {"wall": wall}))
+        return fem.assemble(fem.StructureModel(fem.from_meshio(content), {"wall": wall}))
 
     walls = ("quad", [[0, 1, 2, 3], [0, 3, 5, 4]])
     with warnings.catch_warnings():

@@ -138,7 +138,7 @@ def test_a_beam_twists_about_its_shear_centre_and_stretches_at_its_centroid():
 def test_what_beams_have_is_kept_in_files(tmp_path):
     model = line([[0, 0, 0], [LENGTH, 0, 0]], end_offsets=np.eye(3)[:2], released=((), (5,)))
     fem.assemble(model).save(tmp_path / "arm.npz")
-    assert fem.StructureComponent.load(tmp_path / "arm.npz").model.parts == model.parts
+    assert fem.Component.load(tmp_path / "arm.npz").model.parts == model.parts
 
 
 @pytest.mark.parametrize(

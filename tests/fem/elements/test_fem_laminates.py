@@ -134,7 +134,7 @@ def test_a_section_is_kept_in_files_and_bad_ones_are_named(tmp_path):
     mesh = fem.box_mesh("sheet", (1.0, 0.5), (1, 1), kind="quad")
     model = fem.StructureModel(mesh, {"sheet": shell(fem.layered([PLY]), direction=(1, 0, 0))})
     fem.assemble(model).save(tmp_path / "sheet.npz")
-    assert fem.StructureComponent.load(tmp_path / "sheet.npz").model.parts == model.parts
+    assert fem.Component.load(tmp_path / "sheet.npz").model.parts == model.parts
     with pytest.raises(fem.ModelError, match="make an energy that can be negative"):
         zero = np.zeros((3, 3)).tolist()
         fem.PlateSection(np.diag([1.0, -1.0, 1.0]).tolist(), zero, zero, [[1, 0], [0, 1]], 1.0)

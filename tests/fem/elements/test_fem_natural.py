@@ -13,12 +13,13 @@ LINES = [("p", "a", "b", 3), ("q", "b", "c", 4)]
 def frame(theory="euler-bernoulli", axial_force=0.0, **attached):
     section = fem.RectangularSection(0.1, 0.05)
     part = fem.BeamPart(STEEL, section, theory=theory, axial_force=axial_force)
-    return fem.FrameModel(
+    return fem.StructureModel(
         fem.frame_mesh(ENDS, LINES),
         parts={"p": part, "q": part},
         supports=[fem.Support("a", ("x", "y", "rotation"))],
         springs=[fem.PointSpring("b", "y", 1e6)],
         **attached,
+        plane=True,
     )
 
 
@@ -30,7 +31,7 @@ def beams(theory, axial_force=0.0, offset=(0.0, 0.0)):
         orientation=(0.0, 1.0, 0.3),
     )  # fmt: skip
     return fem.StructureModel(
-        fem.structure_mesh(fem.frame_mesh(ends, LINES)),
+        fem.frame_mesh(ends, LINES),
         parts={"p": part, "q": part},
         supports=[fem.Support("a", ("x", "y", "z"))],
         springs=[fem.PointSpring("b", "rotation_y", 1e4)],
@@ -54,10 +55,11 @@ def block(kind, lengths=(1.0, 0.05, 0.02), poisson=0.3, thickness=None, plane=No
 def trusses():
     part = fem.TrussPart(STEEL, 1e-4)
     held = [fem.Support("a", ("x", "y")), fem.Support("c", "y")]
-    return fem.FrameModel(
+    return fem.StructureModel(
         fem.frame_mesh({"a": (0, 0), "b": (1, 2), "c": (2, 0.5)}, [("p", "a", "b", 1),
                        ("p", "b", "c", 1), ("p", "a", "c", 1)]),
         parts={"p": part}, supports=held,
+        plane=True,
     )  # fmt: skip
 
 

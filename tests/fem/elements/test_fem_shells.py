@@ -259,9 +259,7 @@ def test_a_beam_goes_on_where_a_shell_ends():
     """A strip whose end is coupled to a beam of the same section: one cantilever of 2 m."""
     material = fem.Material(E, RHO, 0.0)
     strip = fem.box_mesh("strip", (1.0, 0.1), (16, 2), kind="quad")
-    rod = fem.structure_mesh(
-        fem.frame_mesh({"joint": (1, 0.05, 0), "tip": (2, 0.05, 0)}, [("rod", "joint", "tip", 4)])
-    )
+    rod = fem.frame_mesh({"joint": (1, 0.05, 0), "tip": (2, 0.05, 0)}, [("rod", "joint", "tip", 4)])
     section = fem.RectangularSection(width=0.01, height=0.1)
     model = fem.StructureModel(
         fem.joined([strip, rod]),
@@ -305,8 +303,11 @@ def test_a_shell_that_goes_on_along_the_solid_is_clamped(recwarn):
     mesh = fem.frame_mesh(points, [("s", "a", "b", 4), ("s", "b", "c", 4), ("s", "c", "d", 8)])
     stiff = fem.Material(E / (1 - NU**2), RHO)
     held = [fem.Support("a", ("x", "y")), fem.Support("b", "y"), fem.Support("c", "y")]
-    beam = fem.FrameModel(
-        mesh, {"s": fem.BeamPart(stiff, fem.RectangularSection(1.0, 0.01))}, supports=held
+    beam = fem.StructureModel(
+        mesh,
+        {"s": fem.BeamPart(stiff, fem.RectangularSection(1.0, 0.01))},
+        supports=held,
+        plane=True,
     )
     clamped = 3.5160 / (2 * np.pi) * np.sqrt(E * 1e-4 / (12 * (1 - NU**2) * RHO))
     assert lowest_hz(fem.assemble(beam), 1)[0] < lowest_hz(lapped, 1)[0] < clamped
@@ -390,7 +391,7 @@ SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]]
                 ),
                 {"a": PLATE, "b": fem.SolidPart(STEEL, "stress", 0.01)},
             ),
-            "shells and solids in the plane do not mix",
+            "a structure in the plane has no shells",
         ),
     ],
 )
@@ -403,7 +404,7 @@ def test_a_bad_shell_is_one_sentence(make, sentence):
 def test_a_saved_shell_is_the_same(tmp_path):
     component = shell(saddle("quad"), E, NU, 0.01, [fem.Support("x0", CLAMP)], offset=0.003)
     component.save(tmp_path / "shell.npz")
-    again = fem.StructureComponent.load(tmp_path / "shell.npz")
+    again = fem.Component.load(tmp_path / "shell.npz")
     assert again.model.parts == component.model.parts
     assert np.array_equal(again.stiffness.toarray(), component.stiffness.toarray())
 

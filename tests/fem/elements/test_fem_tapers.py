@@ -10,7 +10,6 @@ from structures import CLAMP, flexibility, lowest_hz
 
 import fem
 from fem.render.colouring import surface_values
-from fem.render.frame_surface import frame_surface
 from fem.render.structure_surface import structure_surface
 
 E, RHO, NU = 2.0e11, 8000.0, 0.3
@@ -32,11 +31,12 @@ def mesh(elements, end=(1.0, 0.0, 0.0)):
 
 def in_plane(section, elements, **options):
     return fem.assemble(
-        fem.FrameModel(
+        fem.StructureModel(
             mesh(elements),
             {"arm": fem.BeamPart(STEEL, section, **options)},
             supports=[fem.Support("root", ("x", "y", "rotation"))],
             interfaces={d: fem.Interface("tip", d) for d in ("x", "y", "rotation")},
+            plane=True,
         )
     )
 
@@ -92,16 +92,17 @@ def wedge_hz(count):
 
 def bending_only(n):
     frame = mesh(n)
-    frame = fem.FrameMesh(
+    frame = fem.StructureMesh(
         frame.points,
-        frame.lines,
-        frame.parts,
+        frame.cells,
+        frame.groups,
         {**frame.point_sets, "all": np.arange(len(frame.points))},
     )
-    return fem.FrameModel(
+    return fem.StructureModel(
         frame,
         {"arm": fem.BeamPart(STEEL, WEDGE)},
         supports=[fem.Support("root", ("y", "rotation")), fem.Support("all", "x")],
+        plane=True,
     )
 
 
@@ -224,16 +225,17 @@ def test_a_round_taper_stands_upright_without_an_orientation():
         (lambda: fem.TaperedSection(TUBE.start, TUBE.end, "a", "a"), "it starts and ends at 'a'"),
         (
             lambda: in_plane(fem.TaperedSection(TUBE.start, TUBE.end, "root", "top"), 2),
-            "there is no point 'top'",
+            "there is no point or face 'top'",
         ),
         (
             lambda: fem.assemble(
-                fem.FrameModel(
+                fem.StructureModel(
                     fem.frame_mesh(
                         {"root": (0, 0), "tip": (1, 0), "more": (2, 0)},
                         [("arm", "root", "tip", 1), ("arm", "tip", "more", 1)],
                     ),
                     {"arm": fem.BeamPart(STEEL, WEDGE)},
+                    plane=True,
                 )
             ),
             "part 'arm': node 2 lies beyond the way from 'root' to 'tip'",
@@ -247,17 +249,16 @@ def test_a_bad_taper_is_one_sentence(make, sentence):
 
 
 def test_a_saved_taper_is_the_same(tmp_path):
-    for build, kind in ((in_plane, fem.Component), (in_space, fem.StructureComponent)):
+    for build in (in_plane, in_space):
         component = build(TUBE, 2)
         component.save(tmp_path / "arm.npz")
-        assert kind.load(tmp_path / "arm.npz").model.parts == component.model.parts
+        assert fem.Component.load(tmp_path / "arm.npz").model.parts == component.model.parts
 
 
 @pytest.mark.parametrize("build", [in_plane, in_space])
 def test_a_taper_is_drawn_and_coloured_as_it_is(build):
     component = build(WEDGE, 8)
-    draw = frame_surface if build is in_plane else structure_surface
-    drawing = draw(component)
+    drawing = structure_surface(component)
     points, _ = drawing.place(np.zeros(len(component.free)))
     height = 0.04 - 0.02 * points[:, 0]
     np.testing.assert_allclose(np.abs(points[:, 1]), height / 2, atol=1e-12)

@@ -7,7 +7,6 @@ from structures import CLAMP, STEEL, flexibility, lowest_hz
 
 import fem
 from fem.render.colouring import surface_values
-from fem.render.frame_surface import frame_surface
 from fem.render.structure_surface import structure_surface
 
 E, RHO, AREA = 2.0e11, 8000.0, 1e-4
@@ -20,12 +19,13 @@ def bracket(**attached):
         {"top": (0, 1), "low": (0, -1), "joint": (1, 0)},
         [("bars", "top", "joint", 1), ("bars", "low", "joint", 1)],
     )
-    return fem.FrameModel(
+    return fem.StructureModel(
         mesh,
         {"bars": BAR},
         supports=[fem.Support(end, ("x", "y")) for end in ("top", "low")],
         interfaces={d: fem.Interface("joint", d) for d in ("x", "y")},
         **attached,
+        plane=True,
     )
 
 
@@ -79,7 +79,7 @@ def rod(kind, elements):
     """A rod of 1 m, clamped at one end, that moves along itself only."""
     step = 1 if kind == "line" else 2
     ends = {"root": (0, 0, 0), "tip": (1, 0, 0)}
-    mesh = fem.structure_mesh(fem.frame_mesh(ends, [("rod", "root", "tip", step * elements)]))
+    mesh = fem.frame_mesh(ends, [("rod", "root", "tip", step * elements)])
     if kind == "line3":
         order = np.argsort(mesh.points[:, 0])
         cells = np.stack([order[:-2:2], order[2::2], order[1::2]], axis=1)
@@ -138,7 +138,7 @@ def test_nodes_that_nothing_holds_across_are_told():
     held = [fem.Support(end, ("x", "y")) for end in "ab"]
     told = r"frame_mesh: 1 nodes of trusses \(of 'm'\) are not held in all directions: 2; hold"
     with pytest.warns(fem.JointWarning, match=told):
-        fem.assemble(fem.FrameModel(mesh, {"rod": BAR}, supports=held))
+        fem.assemble(fem.StructureModel(mesh, {"rod": BAR}, supports=held, plane=True))
     with pytest.warns(fem.JointWarning, match=r"are not held"):
         plane = [*held, fem.Support("m", "y")]
         fem.assemble(fem.StructureModel(mesh, {"rod": BAR}, supports=plane))
@@ -161,7 +161,7 @@ def test_trusses_brace_beams(recwarn):
     # the mast's tip is all but rigid along y
     stiffness = 3 * E * second + E * 1e-9 / np.sqrt(2) / 2
     for model in (
-        fem.FrameModel(mesh, plain, supports=flat, interfaces=interfaces),
+        fem.StructureModel(mesh, plain, supports=flat, interfaces=interfaces, plane=True),
         fem.StructureModel(mesh, parts, supports=held, interfaces=interfaces),
     ):
         assert flexibility(fem.assemble(model), "tip") == pytest.approx(1 / stiffness, rel=1e-5)
@@ -173,14 +173,17 @@ def test_trusses_brace_beams(recwarn):
     [
         (lambda: fem.TrussPart(STEEL, -1.0), "truss part: area must be positive"),
         (
-            lambda: bracket(point_masses=[fem.PointMass("joint", 1.0, 0.1)]),
-            "point mass at 'joint' acts on a rotation, but only trusses meet at 'joint'",
+            lambda: fem.assemble(bracket(point_masses=[fem.PointMass("joint", 1.0, 0.1)])),
+            "'joint' has no direction 'rotation_z': it does not turn, since only solids or trusses",
         ),
         (
-            lambda: bracket(springs=[fem.PointSpring("joint", "rotation", 1.0)]),
-            "spring at 'joint' acts on a rotation",
+            lambda: fem.assemble(bracket(springs=[fem.PointSpring("joint", "rotation", 1.0)])),
+            "'joint' has no direction 'rotation': it does not turn",
         ),
-        (lambda: bracket(hinges=[fem.Hinge("joint", "bars")]), "of part 'bars', a truss"),
+        (
+            lambda: bracket(hinges=[fem.Hinge("joint", "bars")]),
+            "hinge at 'joint': 'bars' is no beam part",
+        ),
         (
             lambda: fem.assemble(fem.StructureModel(curved([1.3, 0, 0.0]), {"rod": BAR})),
             "not near the middle|doubles back",
@@ -199,7 +202,7 @@ def test_saved_trusses_are_the_same(tmp_path):
     assert fem.Component.load(tmp_path / "frame.npz").model.parts == frame.model.parts
     whole = rod("line3", 2)
     whole.save(tmp_path / "rod.npz")
-    again = fem.StructureComponent.load(tmp_path / "rod.npz")
+    again = fem.Component.load(tmp_path / "rod.npz")
     assert np.array_equal(again.stiffness.toarray(), whole.stiffness.toarray())
 
 
@@ -212,7 +215,7 @@ def test_trusses_are_drawn_straight_and_coloured_by_their_stress(in_space):
             model.mesh, model.parts, supports=[*model.supports, flat], interfaces=model.interfaces
         )
     component = fem.assemble(model)
-    drawing = structure_surface(component) if in_space else frame_surface(component)
+    drawing = structure_surface(component)
     u = 1e-3 * component.interfaces["y"]
     points, _ = drawing.place(u)
     ends = np.array([[0, 1, 0], [0, -1, 0]]), np.array([1, 1e-3, 0])
@@ -237,14 +240,13 @@ def second_order(middle):
     )
 
 
-def test_a_frame_takes_straight_lines_of_three_nodes_as_two_elements():
-    mesh = fem.from_meshio(second_order([0.8, 0.0, 0.0]), "beam.vtu")
-    assert mesh.lines.tolist() == [[0, 2], [2, 1], [1, 3]]
-    assert mesh.parts["arm"].tolist() == [0, 1] and mesh.parts["end"].tolist() == [2]
+@pytest.mark.parametrize("middle", [[0.8, 0.0, 0.0], [1.0, 0.01, 0.0]])
+def test_lines_of_three_nodes_are_two_beams(middle):
+    mesh = fem.from_meshio(second_order(middle), "beam.vtu")
+    beam = fem.BeamPart(STEEL, fem.CircularSection(0.1))
+    model = fem.StructureModel(mesh, {"arm": beam, "end": beam}, plane=True)
+    assert {name: lines.tolist() for name, (_, lines) in model.beams.items()} == {
+        "arm": [[0, 2], [2, 1]],
+        "end": [[1, 3]],
+    }
     assert mesh.node("middle") == 2
-
-
-@pytest.mark.parametrize("middle", [[1.0, 0.01, 0.0], [2.5, 0.0, 0.0]])
-def test_a_frame_refuses_curved_lines_by_their_number(middle):
-    with pytest.raises(fem.ModelError, match=r"beam.vtu: line3 0 .counted from 0. is not straight"):
-        fem.from_meshio(second_order(middle), "beam.vtu")

@@ -81,7 +81,7 @@ def test_abaqus_has_the_nodes_where_they_are_taken_from(name, tmp_path):
     path = tmp_path / "cell.inp"
     lines = ["*NODE", *rows, f"*ELEMENT, TYPE={name}, ELSET=body", ",\n".join(element)]
     path.write_text("\n".join(lines) + "\n")
-    mesh = fem.read_structure(path)
+    mesh = fem.read_mesh(path)
     assert np.array_equal(mesh.points[mesh.cells[kind][0], : KINDS[kind].dimension],
                           KINDS[kind].nodes)  # fmt: skip
 
@@ -120,7 +120,7 @@ def test_mixed_meshes_come_back_from_every_format(family, tmp_path):
         for name in names[1:]:
             fem.write_mesh(mesh, tmp_path / name)
     for name in names:
-        back = fem.read_structure(tmp_path / name)
+        back = fem.read_mesh(tmp_path / name)
         assert {k: len(c) for k, c in back.cells.items()} == {
             k: len(c) for k, c in mesh.cells.items()
         }
@@ -185,7 +185,7 @@ def _block_of_gmsh(gmsh, shape, order, incomplete):
 def test_blocks_of_gmsh_have_their_volume_and_frequencies(gmsh_files, name, kinds):
     found = []
     for path in sorted(gmsh_files.glob(f"{name}_*.msh")):
-        mesh = fem.read_structure(path)
+        mesh = fem.read_mesh(path)
         assert mesh.cells.keys() == kinds
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", fem.LockingWarning)
@@ -212,7 +212,7 @@ def test_the_wedges_of_a_vtk_file_are_all_there(tmp_path):
         cell_data={"set:body": [np.ones(1, int), np.ones(2, int)]},
     )  # fmt: skip
     meshio.write(tmp_path / "wedges.vtu", content)
-    mesh = fem.read_structure(tmp_path / "wedges.vtu")
+    mesh = fem.read_mesh(tmp_path / "wedges.vtu")
     part = fem.SolidPart(fem.Material(2.1e11, 7850.0, poissons_ratio=0.3))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", fem.LockingWarning)

@@ -141,7 +141,7 @@ def held_hz(mesh):
 )
 def test_a_bar_of_hexahedra_and_wedges_swings_as_one_of_hexahedra(kind, wedge, within):
     content, true, whole = collapsed_bar(kind, wedge, (8, 2, 2))
-    mesh = fem.structure_from_meshio(content, "bar.inp")
+    mesh = fem.from_meshio(content, "bar.inp")
     assert {k: len(c) for k, c in mesh.cells.items()} == {kind: 32, wedge: 64}
     assert mesh.notes == (f"bar.inp: 64 {kind} with repeated nodes are taken as 64 {wedge}",)
     assert {k: len(c) for k, c in mesh.part("bar").items()} == {kind: 32, wedge: 64}
@@ -168,7 +168,7 @@ def test_groups_follow_when_cells_change_their_kind():
 
 def one_cell(kind, nodes, points):
     content = meshio.Mesh(points, [(kind, [nodes])], cell_data={"set:body": [[1]]})
-    return fem.structure_from_meshio(content, "cell.inp")
+    return fem.from_meshio(content, "cell.inp")
 
 
 def test_what_repeated_nodes_do_not_make_a_cell_is_refused():

@@ -119,7 +119,7 @@ def component(mesh: fem.StructureMesh):
 def test_every_format_gives_the_same_component(tmp_path, extension):
     mesh, path = block(), tmp_path / f"block{extension}"
     write(mesh, path)
-    found = fem.read_structure(path)
+    found = fem.read_mesh(path)
     assert set(found.groups) == set(mesh.groups)
     for name in mesh.groups:
         assert {k: len(at) for k, at in found.part(name).items()} == {
@@ -159,7 +159,7 @@ def test_a_universal_file_of_gmsh_has_the_nodes_of_each_cell_in_their_places(tmp
         gmsh.model.addPhysicalGroup(size, [1], name="whole")
         gmsh.option.setNumber("Mesh.SaveGroupsOfElements", 1)
         gmsh.write(str(tmp_path / "box.unv"))
-    found = fem.read_structure(tmp_path / "box.unv")
+    found = fem.read_mesh(tmp_path / "box.unv")
     assert list(found.groups) == ["whole"]
     assert (found.points[found.cells[kind]] == made.points[made.cells[kind]]).all()
 
@@ -175,10 +175,10 @@ def test_points_that_gmsh_names_beside_elements_it_leaves_out_are_read(tmp_path)
         gmsh.write(str(tmp_path / "without.unv"))
         gmsh.option.setNumber("Mesh.SaveGroupsOfNodes", 1)
         gmsh.write(str(tmp_path / "box.unv"))
-    found = fem.read_structure(tmp_path / "box.unv")
+    found = fem.read_mesh(tmp_path / "box.unv")
     assert found.points[found.point_sets["corner"]].tolist() == [[1.0, 1.0, 1.0]]
     with pytest.raises(fem.ModelError, match=r"'corner' has member 1 of kind 8, .* Gmsh"):
-        fem.read_structure(tmp_path / "without.unv")
+        fem.read_mesh(tmp_path / "without.unv")
 
 
 @pytest.mark.parametrize(
@@ -200,7 +200,7 @@ def test_what_is_not_read_of_a_universal_file_is_refused(tmp_path, old, new, sai
     assert old in text
     path.write_text(text.replace(old, new))
     with pytest.raises(fem.ModelError, match=said):
-        fem.read_structure(path)
+        fem.read_mesh(path)
 
 
 def step_of(file):
@@ -248,14 +248,14 @@ def test_what_a_med_file_holds_otherwise_is_refused(tmp_path, change, said):
     with h5py.File(path, "a") as file:
         change(file)
     with pytest.raises(fem.ModelError, match=said):
-        fem.read_structure(path)
+        fem.read_mesh(path)
 
 
 def test_what_is_no_med_file_is_refused(tmp_path):
     path = tmp_path / "block.med"
     path.write_text("no")
     with pytest.raises(fem.ModelError, match="is not a MED file, or is cut off"):
-        fem.read_structure(path)
+        fem.read_mesh(path)
 
 
 @pytest.mark.parametrize(
@@ -269,7 +269,7 @@ def test_other_formats_are_refused_with_what_to_do(tmp_path, extension, said):
     path = tmp_path / f"block{extension}"
     path.write_text("")
     with pytest.raises(fem.ModelError, match=said):
-        fem.read_structure(path)
+        fem.read_mesh(path)
 
 
 LEGACY = """# vtk DataFile Version 4.2
@@ -298,7 +298,7 @@ set:root 1 8 int
 def test_names_of_vtk_legacy_files_are_as_they_were_given(tmp_path):
     path = tmp_path / "brick.vtk"
     path.write_text(LEGACY)
-    mesh = fem.read_structure(path)
+    mesh = fem.read_mesh(path)
     assert set(mesh.groups) == {"left side", "100%"}
     assert mesh.nodes("root").tolist() == [0, 3, 4, 7]
 
@@ -312,14 +312,14 @@ def test_two_arrays_of_one_name_are_refused(tmp_path, extension):
         write(block(), path)
         path.write_bytes(path.read_bytes().replace(b'"set:right"', b'"set:left"'))
     with pytest.raises(fem.ModelError, match=r"has two arrays 'set:left"):
-        fem.read_structure(path)
+        fem.read_mesh(path)
 
 
 def test_a_vtk_legacy_file_that_is_not_understood_is_refused_with_advice(tmp_path):
     path = tmp_path / "brick.vtk"
     path.write_text(LEGACY.replace("POINTS 8 double", "POINTS 8 quaternion"))
     with pytest.raises(fem.ModelError, match=r"type 'quaternion', .* as '\.vtu'"):
-        fem.read_structure(path)
+        fem.read_mesh(path)
 
 
 FIELD_UNV = {
@@ -358,7 +358,7 @@ last
 def test_an_edge_and_empty_groups_of_salome_are_read(tmp_path):
     path = tmp_path / "edge.unv"
     path.write_text("".join(FIELD_UNV.values()))
-    mesh = fem.read_structure(path)
+    mesh = fem.read_mesh(path)
     assert mesh.points[mesh.cells["line3"][0]][:, 0].tolist() == [0.0, 1.0, 0.5]
     assert mesh.part("edge") == {"line3": [0]}
     told = "; ".join(map(str, mesh.left_out))
@@ -371,7 +371,7 @@ def test_pyramids_of_salome_are_read(tmp_path, kind):
     own = KINDS_OF_CELLS[kind]
     mesh = fem.StructureMesh(own.nodes, {kind: [range(own.node_count)]})
     write_unv(mesh, tmp_path / "pyramid.unv")
-    found = fem.read_structure(tmp_path / "pyramid.unv")
+    found = fem.read_mesh(tmp_path / "pyramid.unv")
     assert found.cells[kind].tolist() == [list(range(own.node_count))]
 
 
@@ -383,7 +383,7 @@ def test_properties_tell_the_elements_of_a_universal_file_without_groups_apart(t
     for cells, groups in ((cell + cell.replace("  7   ", "  8   ", 1), []),
                           (cell + other, ["property 2", "property 5"])):  # fmt: skip
         path.write_text(text.replace(cell, cells))
-        mesh = fem.read_structure(path)
+        mesh = fem.read_mesh(path)
         assert sorted(mesh.groups) == groups
         told = [item.keyword for item in mesh.left_out]
         assert ("physical properties of elements" in told) == bool(groups)
@@ -427,29 +427,29 @@ def test_all_data_that_vtk_writes_beside_a_mesh_is_passed(tmp_path, version, bin
     writer.SetFileType(2 if binary else 1)
     writer.SetFileName(str(tmp_path / "box.vtk"))
     writer.Write()
-    found = fem.read_structure(tmp_path / "box.vtk")
+    found = fem.read_mesh(tmp_path / "box.vtk")
     assert (found.points == box.points).all()
     assert (found.cells["hexahedron"] == box.cells["hexahedron"]).all()
     assert found.part("right") == {"hexahedron": [1]}
     data.SetScalars(array("rgb", 3, "u1"))
     writer.Write()
-    assert fem.read_structure(tmp_path / "box.vtk").part("right") == {"hexahedron": [1]}
+    assert fem.read_mesh(tmp_path / "box.vtk").part("right") == {"hexahedron": [1]}
 
 
 def test_med_in_other_coordinates_is_refused_and_another_unit_told(tmp_path):
     path, box = tmp_path / "box.med", fem.box_mesh("block", (1.0, 1.0, 1.0), (1, 1, 1))
     write_med(box, path)
-    assert not fem.read_structure(path).notes
+    assert not fem.read_mesh(path).notes
     for system, name in ((1, "cylindrical"), (2, "spherical")):
         with h5py.File(path, "r+") as file:
             file["ENS_MAA/block"].attrs["REP"] = system
         with pytest.raises(fem.ModelError, match=rf"are {name} \(REP = {system}\)"):
-            fem.read_structure(path)
+            fem.read_mesh(path)
     for unit, told in (("m", False), ("", False), ("INCONNUE", False), ("mm", True)):
         with h5py.File(path, "r+") as file:
             file["ENS_MAA/block"].attrs["REP"] = 0
             file["ENS_MAA/block"].attrs["UNI"] = np.bytes_(3 * f"{unit:16}")
-        mesh = fem.read_structure(path)
+        mesh = fem.read_mesh(path)
         assert (mesh.points == box.points).all()
         assert len(mesh.notes) == told and all("the unit 'mm'" in note for note in mesh.notes)
         assert mesh.unit == ("mm" if told else "")

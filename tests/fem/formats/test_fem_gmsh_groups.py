@@ -46,7 +46,7 @@ def folder(tmp_path_factory):
 
 
 def assembled(path):
-    mesh = fem.read_structure(path)
+    mesh = fem.read_mesh(path)
     tip = fem.Interface("tip", "z")
     supports = [fem.Support("root (surface)", ("x", "y", "z"))]
     return fem.assemble(
@@ -68,7 +68,7 @@ def test_every_dialect_of_gmsh_is_the_same_component(folder, name):
 
 
 def test_a_surface_and_a_curve_of_one_name_stay_apart(folder):
-    mesh = fem.read_structure(folder / "4.1_0.msh")
+    mesh = fem.read_mesh(folder / "4.1_0.msh")
     assert set(mesh.groups["root (surface)"]) == {"triangle"}
     assert set(mesh.groups["root (curve)"]) == {"line"}
     with pytest.raises(fem.ModelError, match=r"no point or face 'root'; .*'root \(surface\)'"):
@@ -84,16 +84,16 @@ def test_an_element_that_stands_twice_in_one_group_stays_twice_and_is_refused(fo
     lines.insert(last, again)
     path = tmp_path / "twice.msh"
     path.write_text("\n".join(lines) + "\n")
-    name = "also" if "also" in fem.read_structure(path).groups else "body"
+    name = "also" if "also" in fem.read_mesh(path).groups else "body"
     with pytest.raises(fem.ModelError, match="stands twice"):
-        fem.StructureModel(fem.read_structure(path), {name: fem.SolidPart(STEEL)})
+        fem.StructureModel(fem.read_mesh(path), {name: fem.SolidPart(STEEL)})
 
 
 def test_a_section_that_is_not_understood_is_refused_by_name(folder, tmp_path):
     path = tmp_path / "more.msh"
     path.write_text((folder / "4.1_0.msh").read_text() + "$Springs\n1\n$EndSprings\n")
     with pytest.raises(fem.ModelError, match=r"section \$Springs is not understood"):
-        fem.read_structure(path)
+        fem.read_mesh(path)
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,7 @@ def boxes(tmp_path_factory):
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(2)
         gmsh.write(str(path))
-    mesh = fem.read_structure(path)
+    mesh = fem.read_mesh(path)
     x = mesh.points[:, 0]
     return mesh.with_point_sets({"ends": np.flatnonzero((x < 1e-9) | (x > 0.4 - 1e-9))})
 

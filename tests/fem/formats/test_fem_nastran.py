@@ -73,7 +73,7 @@ def test_all_solids_in_all_fields_are_the_component_that_was_written(tmp_path, f
     mesh = mixed_block(family, lambda corners: 0.5 * corners)
     path = tmp_path / "block.bdf"
     path.write_text(bulk(mesh, style))
-    found = fem.read_structure(path)
+    found = fem.read_mesh(path)
     known, read = component(mesh, ["body"]), component(found, ["PSOLID 1", "PSOLID 2"])
     assert read.rigid_mass[0, 0] == pytest.approx(known.rigid_mass[0, 0], rel=1e-12)
     np.testing.assert_allclose(lowest_hz(read, 4), lowest_hz(known, 4), rtol=1e-9)
@@ -119,7 +119,7 @@ def test_what_is_not_read_is_refused_with_its_place(tmp_path, old, new, said):
     assert old in BRICK
     path.write_text(BRICK.replace(old, new, 1))
     with pytest.raises(fem.ModelError, match=said):
-        fem.parts_of(fem.read_structure(path))
+        fem.parts_of(fem.read_mesh(path))
 
 
 def test_cards_of_analyses_and_unused_systems_change_nothing(tmp_path):
@@ -127,7 +127,7 @@ def test_cards_of_analyses_and_unused_systems_change_nothing(tmp_path):
     path = tmp_path / "brick.bdf"
     more = "CORD2C,1,0,0.,0.,0.,0.,0.,1.\n,1.,0.,1.\nCORD2S,2,0,0.,0.,0.,0.,0.,1.\n,1.,0.,1.\n"
     path.write_text(BRICK.replace("PARAM", f"NLPARM,1,10\nTABDMP1,3\n{more}PARAM", 1))
-    found = fem.read_structure(path)
+    found = fem.read_mesh(path)
     assert [str(item) for item in found.left_out][:2] == [
         "NLPARM (1, first in line 5): which analysis is made is told by the scene",
         "TABDMP1 (1, first in line 6): which analysis is made is told by the scene",
@@ -137,7 +137,7 @@ def test_cards_of_analyses_and_unused_systems_change_nothing(tmp_path):
 def test_parameters_that_nobody_knows_are_named(tmp_path):
     path = tmp_path / "brick.bdf"
     path.write_text(BRICK.replace("PARAM", "PARAM,WTMAS,.25\nPARAM,XQZ,1\nPARAM,COUPMASS,1\nPARAM"))
-    assert [str(item) for item in fem.read_structure(path).left_out][:4] == [
+    assert [str(item) for item in fem.read_mesh(path).left_out][:4] == [
         "PARAM WTMAS (1, first in line 5): no parameter of this name is known; is it WTMASS?",
         "PARAM XQZ (1, first in line 6): no parameter of this name is known",
         "PARAM COUPMASS (1, first in line 7): masses are consistent here, always",
@@ -151,13 +151,13 @@ def test_marks_of_continuations_are_compared_from_the_second_column_on(tmp_path)
     text = BRICK.replace("PSOLID,2,1", f"PSOLID  2       1{'':55} +000001\n++000001")
     assert "++000001" in text
     path.write_text(text)
-    assert fem.read_structure(path).described["PSOLID 2"]["made"]
+    assert fem.read_mesh(path).described["PSOLID 2"]["made"]
 
 
 def test_cards_to_ignore_are_left_out(tmp_path):
     path = tmp_path / "brick.bdf"
     path.write_text(BRICK.replace("PARAM", "CGAP,9,1,1,2\nPGAP,1\nPARAM", 1))
-    found = fem.read_structure(path, ignore=["CGAP", "PGAP"])
+    found = fem.read_mesh(path, ignore=["CGAP", "PGAP"])
     assert "CGAP (1, first in line 5): it is to be ignored" in map(str, found.left_out)
 
 
@@ -166,12 +166,12 @@ def test_included_files_are_read_and_errors_name_them(tmp_path):
     (tmp_path / "points.inc").write_text("GRID,1," + points)
     path = tmp_path / "brick.bdf"
     path.write_text(f"{head}INCLUDE 'POINTS.\nINC'\n")
-    assert len(fem.read_structure(path).cells["hexahedron"]) == 1
+    assert len(fem.read_mesh(path).cells["hexahedron"]) == 1
     (tmp_path / "points.inc").write_text("GRID,1," + points.replace("CHEXA,1,2", "CHEXA,1,x"))
     with pytest.raises(fem.ModelError, match=r"brick.bdf: points.inc line 9: CHEXA: 'X'"):
-        fem.read_structure(path)
+        fem.read_mesh(path)
     path.write_text(BRICK.replace("CEND", "INCLUDE '/programs/alter.v9'\nCEND", 1))
-    told = [str(item) for item in fem.read_structure(path).left_out]
+    told = [str(item) for item in fem.read_mesh(path).left_out]
     assert told[0].startswith("INCLUDE of executive control (1, first in line 2): it holds no bulk")
 
 
@@ -188,7 +188,7 @@ def test_meshio_writes_the_same_solids(tmp_path, family, form):
     content = meshio.Mesh(mesh.points, list(cells.items()), cell_data={"nastran:ref": ones})
     meshio.nastran.write(path, content, point_format=form, cell_format="fixed-small")
     path.write_text(path.read_text().replace("_", " "))  # it writes CHEXA_ for 20 nodes
-    found = fem.read_structure(path)
+    found = fem.read_mesh(path)
     assert set(found.cells) == set(cells)
     for kind, nodes in cells.items():
         np.testing.assert_allclose(found.points[found.cells[kind]], mesh.points[nodes], atol=1e-6)

@@ -18,7 +18,7 @@ CLAMPED = 1.8751040687
 def component(tmp_path, cards):
     path = tmp_path / "deck.bdf"
     path.write_text(f"{HEAD}{cards}ENDDATA\n")
-    mesh = fem.read_structure(path)
+    mesh = fem.read_mesh(path)
     return fem.assemble(fem.StructureModel(mesh, fem.parts_of(mesh)))
 
 
@@ -122,7 +122,7 @@ def test_a_place_of_added_mass_aside_of_the_neutral_axis_is_told(tmp_path):
     for last, told in (("0.,0.,0.,0.,.1,.2", 1), ("0.,0.,0.,0.", 0), (".1,.2,.1,.2,.1,.2", 0)):
         prop = f"PBEAM,7,1,1.-3,4.-6,1.-7,,2.-7,1.\n,,,,,,,,\n,,,,,,,,\n,{last}\n"
         path.write_text(f"{HEAD}{cantilever('CBEAM', prop, 1)}ENDDATA\n")
-        names = [item.keyword for item in fem.read_structure(path).left_out]
+        names = [item.keyword for item in fem.read_mesh(path).left_out]
         assert names.count("place of NSM of PBEAM") == told
 
 

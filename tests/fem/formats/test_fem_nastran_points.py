@@ -31,7 +31,7 @@ def read(tmp_path, more, case=None):
         case = "SPC = 1" if "SPC1,1," in more or "SPC1    1 " in more else ""
     path = tmp_path / "deck.bdf"
     path.write_text(f"SOL 103\nCEND\n{case}\nBEGIN BULK\n{BRICK}{more}ENDDATA\n")
-    return fem.read_structure(path)
+    return fem.read_mesh(path)
 
 
 def assembled(mesh, **more):
@@ -127,7 +127,7 @@ def test_what_stands_where_a_card_has_no_field_is_refused_and_so_are_whole_numbe
     case = "SPC = 1\nMPC = 8" if "MPC," in more else "SPC = 1"
     path.write_text(f"SOL 103\nCEND\n{case}\nBEGIN BULK\n{text}{more}SPC1,1,3,1\nENDDATA\n")
     with pytest.raises(fem.ModelError, match=said):
-        fem.parts_of(fem.read_structure(path))
+        fem.parts_of(fem.read_mesh(path))
 
 
 def test_a_bush_that_turns_corners_of_solids_is_named(tmp_path):
@@ -199,7 +199,7 @@ def test_case_control_chooses_supports_and_all_else_is_told(tmp_path):
     )
     path = tmp_path / "bulk.bdf"
     path.write_text(BRICK + "SPC1,3,123,1,THRU,4\n")
-    alone = fem.read_structure(path)
+    alone = fem.read_mesh(path)
     assert alone.attachments.supports and "SPC = 3, the only set, is taken" in alone.notes[0]
 
 

@@ -24,7 +24,7 @@ GRID,8,,0.,.5,0.
 def read(tmp_path, cards):
     path = tmp_path / "deck.bdf"
     path.write_text(f"{HEAD}{cards}ENDDATA\n")
-    return fem.read_structure(path)
+    return fem.read_mesh(path)
 
 
 def component(mesh):

@@ -22,7 +22,7 @@ QUICK, FULL = 15, 2500
 
 
 def read(draft: Draft, path):
-    return (fem.read_mesh if draft.model == "frame" else fem.read_structure)(path)
+    return fem.read_mesh(path)
 
 
 def squares(component):
@@ -38,17 +38,16 @@ def mass_of(component) -> float:
 def places(mesh) -> dict[str, dict[str, list]]:
     """What each name stands for, by coordinates from the first corner of the mesh."""
     points = (mesh.points - mesh.points.min(axis=0)).round(9) + 0.0
-    frame = isinstance(mesh, fem.FrameMesh)
-    cells = {"line": mesh.lines} if frame else mesh.cells
-    groups = {n: {"line": g} for n, g in mesh.parts.items()} if frame else mesh.groups
 
     def sorted_places(nodes):
         return sorted(map(tuple, points[nodes].tolist()))
 
     return {
         "groups": {
-            name: sorted(sorted_places(cells[kind][i]) for kind, of in group.items() for i in of)
-            for name, group in groups.items()
+            name: sorted(
+                sorted_places(mesh.cells[kind][i]) for kind, of in group.items() for i in of
+            )
+            for name, group in mesh.groups.items()
             if any(len(of) for of in group.values())
         },
         "sets": {name: sorted_places(n) for name, n in mesh.point_sets.items() if len(n)},

@@ -1,5 +1,6 @@
 """Meshes of solids from files. The files gmsh_bracket.* and gmsh_hex*.msh are Gmsh 4.15's own."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -14,7 +15,7 @@ CLAMPED = ("x", "y", "z")
 
 
 def bracket(name):
-    mesh = fem.read_structure(DATA / name)
+    mesh = fem.read_mesh(DATA / name)
     return fem.StructureModel(
         mesh,
         {"bracket": fem.SolidPart(STEEL)},
@@ -34,7 +35,7 @@ def test_a_bracket_is_the_same_from_both_files_of_gmsh():
 
 
 def test_the_volume_of_the_bracket_is_that_of_the_block_less_the_bore():
-    mesh = fem.read_structure(DATA / "gmsh_bracket.msh")
+    mesh = fem.read_mesh(DATA / "gmsh_bracket.msh")
     component = fem.assemble(fem.StructureModel(mesh, {"bracket": fem.SolidPart(STEEL)}))
     volume = component.mass.sum() / 3 / STEEL.density
     assert volume == pytest.approx(0.1 * 0.06 * 0.02 - np.pi * 0.012**2 * 0.02, rel=1e-4)
@@ -43,7 +44,7 @@ def test_the_volume_of_the_bracket_is_that_of_the_block_less_the_bore():
 @pytest.mark.parametrize("kind", ["hexahedron20", "hexahedron27"])
 def test_hexahedra_of_gmsh_have_the_nodes_where_they_are_expected(kind):
     ours = fem.box_mesh("block", (0.3, 0.1, 0.05), (2, 2, 1), kind=kind)
-    theirs = fem.read_structure(DATA / f"gmsh_hex{kind[-2:]}.msh")
+    theirs = fem.read_mesh(DATA / f"gmsh_hex{kind[-2:]}.msh")
     parts = {"block": fem.SolidPart(STEEL)}
     found = [
         lowest_hz(fem.assemble(fem.StructureModel(m, parts, [fem.Support(at, CLAMPED)])), 5)
@@ -55,20 +56,18 @@ def test_hexahedra_of_gmsh_have_the_nodes_where_they_are_expected(kind):
 @pytest.mark.parametrize("extension", [".vtu", ".inp"])
 def test_a_written_mesh_of_solids_comes_back_to_the_last_bit(tmp_path, extension):
     block = fem.box_mesh("block", (1 / 3, 0.1, np.pi), (2, 1, 2))
-    tail = fem.structure_mesh(
-        fem.frame_mesh({"a": (0, 0, 0), "b": (-1, 0, 0)}, [("t", "a", "b", 2)])
-    )
+    tail = fem.frame_mesh({"a": (0, 0, 0), "b": (-1, 0, 0)}, [("t", "a", "b", 2)])
     mesh = fem.joined([block, tail])
     assert len(mesh.points) == len(block.points) + len(tail.points) - 1
     path = tmp_path / f"mesh{extension}"
     fem.write_mesh(mesh, path)
-    back = fem.read_structure(path)
+    back = fem.read_mesh(path)
     assert np.array_equal(back.points, mesh.points)
     assert all(np.array_equal(back.cells[kind], cells) for kind, cells in mesh.cells.items())
     assert back.part("t").keys() == {"line"} and back.part("block").keys() == {"hexahedron20"}
     for name in mesh.names:
         assert np.array_equal(back.nodes(name), mesh.nodes(name))
-    with pytest.raises(fem.ModelError, match=r"of a structure is written as '\.vtu' or '\.inp'"):
+    with pytest.raises(fem.ModelError, match="only a mesh of two-node lines is written as"):
         fem.write_mesh(mesh, tmp_path / "mesh.msh")
 
 
@@ -77,7 +76,7 @@ def test_abaqus_files_keep_every_kind_of_cell(tmp_path, kind):
     lengths = (1.0, 0.5, 0.25)[: 2 if kind[0] in "tq" and kind != "tetra10" else 3]
     mesh = fem.box_mesh("block", lengths, (2, 1, 1)[: len(lengths)], kind=kind)
     fem.write_mesh(mesh, tmp_path / "block.inp")
-    back = fem.read_structure(tmp_path / "block.inp")
+    back = fem.read_mesh(tmp_path / "block.inp")
     assert np.array_equal(back.cells[kind], mesh.cells[kind])
 
 
@@ -97,12 +96,12 @@ def test_elements_of_abaqus_may_go_on_over_lines(tmp_path):
     rows += [", ".join(cell[15:]), "*NSET, NSET=root", "1, 2"]
     path = tmp_path / "cube.inp"
     path.write_text("\n".join(rows) + "\n")
-    mesh = fem.read_structure(path)
+    mesh = fem.read_mesh(path)
     assert np.array_equal(mesh.cells["hexahedron20"], nodes.cells["hexahedron20"])
     assert mesh.part("cube")["hexahedron20"].tolist() == [0]
     path.write_text("\n".join(rows).replace(f"{cell[-1]}\n*NSET", "\n*NSET") + "\n")
     with pytest.raises(fem.ModelError, match=r"line 23: .*element 7 of type C3D20R has 19 nodes"):
-        fem.read_structure(path)
+        fem.read_mesh(path)
 
 
 def block(**options):
@@ -168,7 +167,7 @@ UP = {"orientation": (1.0, 0.0, 0.0)}
         (lambda: fem.box_mesh("a", (1.0, 1.0), (1, 1, 1)), "do not agree on two or three direct"),
         (lambda: fem.box_mesh("a", (1.0, -1.0), (1, 1)), "must be positive"),
         (lambda: fem.StructureModel(None, {}), "mesh must be a StructureMesh, not None"),
-        (lambda: fem.assemble(None), "needs a FrameModel or a StructureModel, not None"),
+        (lambda: fem.assemble(None), "needs a StructureModel, not None"),
         (lambda: block(parts={}), "block.msh: hexahedron20 0 is in no part of the model"),
         (lambda: block(parts={"b": fem.SolidPart(STEEL)}), "no part 'b'; there are 'block'"),
         (lambda: block(parts={"block": 1}), "parts must be a dictionary by name"),
@@ -238,7 +237,7 @@ UP = {"orientation": (1.0, 0.0, 0.0)}
         ),
         (
             lambda: beam_and_sheet(supports=[fem.Support("x0", "z")]),
-            "a plane structure has no direction 'z'",
+            "a structure in the plane has no direction 'z'",
         ),
         (
             lambda: fem.assemble(
@@ -247,7 +246,7 @@ UP = {"orientation": (1.0, 0.0, 0.0)}
                     interfaces={"i": fem.Interface("p", "z")},
                 )
             ),
-            "interface 'i': a plane structure has no direction 'z'",
+            "interface 'i': a structure in the plane has no direction 'z'",
         ),
         (lambda: fem.assemble(folded()), "f.msh: part 'block': hexahedron: cell 1 of the part, at"),
         (lambda: fem.assemble(upright()), "part 'mast': line 0 runs along z, so it needs an orie"),
@@ -302,17 +301,25 @@ def test_nodes_in_another_order_are_found_out():
         fem.StructureMesh(mesh.points, {"hexahedron20": cells})
 
 
-def test_a_plane_frame_refuses_what_only_a_structure_has():
+@pytest.mark.parametrize(
+    ("attached", "sentence"),
+    [
+        ({"supports": [fem.Support("a", ("x", "z"))]}, "support at 'a': a structure in the plane"),
+        ({"springs": [fem.PointSpring("b", "rotation_x", 1.0)]}, "spring at 'b': a structure in"),
+        ({"interfaces": {"i": fem.Interface("b", "z")}}, "interface 'i': a structure in the plane"),
+        (
+            {"mesh": fem.Attachments(links=[fem.Link("b", None, ("z",), 1.0)])},
+            "link at 'b': a structure",
+        ),
+    ],
+)
+def test_a_plane_frame_refuses_what_acts_out_of_its_plane(attached, sentence):
     mesh = fem.frame_mesh({"a": (0, 0), "b": (1, 0)}, [("bar", "a", "b", 1)], "bar.msh")
-    section = fem.CircularSection(0.1)
-    for attached, sentence in (
-        ({"supports": [fem.Support("a", ("x", "z"))]}, "support at 'a': a plane frame has no"),
-        ({"point_masses": [fem.PointMass("b", 1.0, offset=(0, 1, 0))]}, "has an offset or three"),
-        ({"parts": {"bar": fem.BeamPart(STEEL, section, offset=(0.1, 0))}}, "use a StructureMode"),
-    ):
-        options = {"parts": {"bar": fem.BeamPart(STEEL, section)}, **attached}
-        with pytest.raises(fem.ModelError, match=sentence):
-            fem.FrameModel(mesh, **options)
+    mesh = replace(mesh, attachments=attached.get("mesh", fem.Attachments()))
+    given = {name: items for name, items in attached.items() if name != "mesh"}
+    bar = fem.BeamPart(STEEL, fem.CircularSection(0.1))
+    with pytest.raises(fem.ModelError, match=sentence):
+        fem.StructureModel(mesh, {"bar": bar}, **given, plane=True)
 
 
 def test_cells_of_an_unknown_kind_are_told_and_not_dropped():
@@ -325,7 +332,7 @@ def test_cells_of_an_unknown_kind_are_told_and_not_dropped():
         cell_data={"set:block": [[1], [1]]},
     )
     with pytest.raises(fem.ModelError, match=r"not read: 1 hexahedron64 \(in 'block'; block 1 of"):
-        fem.structure_from_meshio(content)
+        fem.from_meshio(content)
     content = meshio.Mesh(np.zeros((4, 3)), [("vertex", [[0], [1]])])
     with pytest.raises(fem.ModelError, match=r"no cells \(it has 4 nodes and 2 vertices\)"):
-        fem.structure_from_meshio(content)
+        fem.from_meshio(content)

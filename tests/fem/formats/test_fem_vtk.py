@@ -88,20 +88,20 @@ def written_by_vtk(path, mesh, mode, codec, big, wide) -> None:
 def test_every_form_in_which_vtk_writes_is_read(tmp_path, mode, codec, big, wide):
     mesh, path = one_of_each(), tmp_path / "cells.vtu"
     written_by_vtk(path, mesh, mode, codec, big, wide)
-    same(fem.read_structure(path), mesh)
+    same(fem.read_mesh(path), mesh)
 
 
 @pytest.mark.parametrize("binary", [False, True])
 def test_cells_of_all_kinds_are_read_from_legacy_files(tmp_path, binary):
     mesh, path = one_of_each(), tmp_path / "cells.vtk"
     as_grid(mesh).save(path, binary=binary)
-    same(fem.read_structure(path), mesh, 0.0 if binary else 1e-10)  # VTK writes so many digits
+    same(fem.read_mesh(path), mesh, 0.0 if binary else 1e-10)  # VTK writes so many digits
 
 
 def test_vtk_and_meshio_read_what_is_written(tmp_path):
     mesh, path = one_of_each(), tmp_path / "cells.vtu"
     fem.write_mesh(mesh, path)
-    same(fem.read_structure(path), mesh)
+    same(fem.read_mesh(path), mesh)
     theirs, grid = pyvista.read(path), as_grid(mesh)
     assert np.array_equal(theirs.points, grid.points)
     assert np.array_equal(theirs.cells, grid.cells)
@@ -114,8 +114,7 @@ def test_vtk_and_meshio_read_what_is_written(tmp_path):
         fem.write_mesh(made, content)
         other = meshio.read(content)
         assert np.array_equal(other.points, made.points)
-        cells = made.cells if isinstance(made, fem.StructureMesh) else {"line": made.lines}
-        for kind, nodes in cells.items():
+        for kind, nodes in made.cells.items():
             assert np.array_equal(other.cells_dict[kind], nodes)
 
 
@@ -138,7 +137,7 @@ def test_what_is_not_understood_in_a_vtu_file_is_told(tmp_path, form, old, new, 
     assert old in path.read_bytes()
     path.write_bytes(path.read_bytes().replace(old, new))
     with pytest.raises(fem.ModelError, match=said) as caught:
-        fem.read_structure(path)
+        fem.read_mesh(path)
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
 
 
@@ -153,7 +152,7 @@ def test_packed_data_that_are_damaged_are_refused(tmp_path, form):
     for place in places:
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x15]) + whole[place + 1 :])
         try:
-            same(fem.read_structure(path), mesh)
+            same(fem.read_mesh(path), mesh)
         except fem.ModelError as error:
             assert str(error).startswith(str(path))
             refused += 1
@@ -175,10 +174,10 @@ def test_what_is_not_understood_in_a_legacy_file_is_told(tmp_path, old, new, sai
         "POINTS 2 float\n0 0 0 1 0 0\nCELLS 1 3\n2 0 1\nCELL_TYPES 1\n3\n"
     )
     path.write_text(text)
-    assert fem.read_structure(path).cells["line"].tolist() == [[0, 1]]
+    assert fem.read_mesh(path).cells["line"].tolist() == [[0, 1]]
     path.write_text(text.replace(old, new))
     with pytest.raises(fem.ModelError, match=said):
-        fem.read_structure(path)
+        fem.read_mesh(path)
 
 
 def test_cells_with_a_wrong_number_of_nodes_are_refused(tmp_path):
@@ -188,9 +187,9 @@ def test_cells_with_a_wrong_number_of_nodes_are_refused(tmp_path):
         "0 0 0 1 0 0 0 1 0\nCELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n9\n"
     )
     with pytest.raises(fem.ModelError, match="a quad has 3 nodes, not 4"):
-        fem.read_structure(path)
+        fem.read_mesh(path)
     path.write_text(path.read_text().replace("\n9\n", "\n5\n"))
-    assert fem.read_structure(path).cells["triangle"].tolist() == [[0, 1, 2]]
+    assert fem.read_mesh(path).cells["triangle"].tolist() == [[0, 1, 2]]
     path.write_text(path.read_text().replace("3 0 1 2", "3 0 1 2 2"))
     with pytest.raises(fem.ModelError, match="a line goes on after the 4 numbers"):
-        fem.read_structure(path)
+        fem.read_mesh(path)

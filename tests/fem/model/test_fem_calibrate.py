@@ -76,11 +76,12 @@ def test_the_dimensions_of_a_cantilever_come_back_from_its_own_frequencies():
 
     def predict(unknowns):
         mesh = fem.frame_mesh({"a": (0, 0), "b": (unknowns["length"], 0)}, [("bar", "a", "b", 6)])
-        model = fem.FrameModel(
+        model = fem.StructureModel(
             mesh,
             {"bar": BAR},
             [fem.Support("a", CLAMP)],
             [fem.PointMass("b", unknowns["mass"])],
+            plane=True,
         )
         return dict(zip("123", frequencies_hz(fem.assemble(model), 3).tolist(), strict=True))
 

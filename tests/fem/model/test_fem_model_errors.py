@@ -14,7 +14,7 @@ def two_bars(**rest):
         [("first", "a", "joint", 2), ("second", "joint", "b", 2)],
         source="bars.msh",
     )
-    return fem.FrameModel(mesh, **{"parts": {"first": BAR, "second": BAR}, **rest})
+    return fem.StructureModel(mesh, **{"parts": {"first": BAR, "second": BAR}, **rest}, plane=True)
 
 
 @pytest.mark.parametrize(
@@ -50,21 +50,30 @@ def two_bars(**rest):
         (lambda: fem.Interface("tip", "up"), "interface at 'tip': there is no direction 'up'"),
         (
             lambda: two_bars(supports=[fem.Support("c", "x")]),
-            "bars.msh: there is no point 'c'; there are 'a', 'joint', 'b'",
+            "bars.msh: there is no point or face 'c'; there are 'a', 'joint', 'b', 'first'",
         ),
-        (lambda: two_bars(point_masses=[fem.PointMass("c", 1.0)]), "there is no point 'c'"),
-        (lambda: two_bars(springs=[fem.PointSpring("c", "x", 1.0)]), "there is no point 'c'"),
-        (lambda: two_bars(hinges=[fem.Hinge("c", "first")]), "there is no point 'c'"),
-        (lambda: two_bars(interfaces={"i": fem.Interface("c", "x")}), "there is no point 'c'"),
+        (lambda: two_bars(point_masses=[fem.PointMass("c", 1.0)]), "there is no point or face 'c'"),
+        (
+            lambda: two_bars(springs=[fem.PointSpring("c", "x", 1.0)]),
+            "there is no point or face 'c'",
+        ),
+        (lambda: two_bars(hinges=[fem.Hinge("c", "first")]), "there is no point or face 'c'"),
+        (
+            lambda: two_bars(interfaces={"i": fem.Interface("c", "x")}),
+            "there is no point or face 'c'",
+        ),
         (
             lambda: two_bars(parts={"first": BAR, "secnd": BAR}),
             "bars.msh: there is no part 'secnd'; there are 'first', 'second'",
         ),
         (
             lambda: two_bars(parts={"first": BAR}),
-            "bars.msh: element 2 is in no part of the model, whose parts are 'first'",
+            "bars.msh: line 2 is in no part of the model, whose parts are 'first'",
         ),
-        (lambda: fem.FrameModel(None, {}), "model: mesh must be a FrameMesh, not None"),
+        (
+            lambda: fem.StructureModel(None, {}, plane=True),
+            "model: mesh must be a StructureMesh, not None",
+        ),
         (
             lambda: two_bars(supports=fem.Support("a", "x")),
             r"bars.msh: supports must be a list of Support, not Support\(point='a'",
@@ -75,33 +84,40 @@ def two_bars(**rest):
         ),
         (
             lambda: two_bars(parts=["first"]),
-            r"parts must be a dictionary of BeamPart and TrussPart by name, not \['first'\]",
+            r"parts must be a dictionary by name, of BeamPart, .*, not \['first'\]",
         ),
         (
             lambda: two_bars(interfaces={"tip": ("a", "y")}),
-            "bars.msh: interfaces must be a dictionary of Interface by name",
+            "bars.msh: interfaces must be a dictionary by name, of Interface",
         ),
-        (lambda: two_bars(parts={}), "element 0 is in no part of the model, whose parts are none"),
+        (lambda: two_bars(parts={}), "line 0 is in no part of the model, whose parts are none"),
         (
             lambda: two_bars(hinges=[fem.Hinge("b", "first")]),
-            "no part 'first' of the model meets the hinge at 'b'; there are 'second'",
+            "no line of part 'first' meets the hinge at 'b'",
         ),
         (
             lambda: two_bars(hinges=[fem.Hinge("joint", "third")]),
-            "no part 'third' of the model meets the hinge",
+            "hinge at 'joint': 'third' is no beam part",
         ),
         (
-            lambda: two_bars(hinges=[fem.Hinge("joint", "first"), fem.Hinge("joint", "second")]),
-            "all parts at 'joint' are hinged there",
+            lambda: fem.assemble(
+                two_bars(hinges=[fem.Hinge("joint", "first"), fem.Hinge("joint", "second")])
+            ),
+            "nothing is joined to the direction 'rotation_z' of point 'joint'; support it",
         ),
-        (lambda: two_bars(hinges=[fem.Hinge("a", "first")]), "all parts at 'a' are hinged there"),
+        (
+            lambda: fem.assemble(two_bars(hinges=[fem.Hinge("a", "first")])),
+            "nothing is joined to the direction 'rotation_z' of point 'a'",
+        ),
         (
             lambda: two_bars(hinges=[fem.Hinge("joint", "first"), fem.Hinge("joint", "first")]),
             "the hinge of part 'first' at 'joint' is given twice",
         ),
         (
-            lambda: two_bars(
-                supports=[fem.Support("a", CLAMP)], interfaces={"root": fem.Interface("a", "y")}
+            lambda: fem.assemble(
+                two_bars(
+                    supports=[fem.Support("a", CLAMP)], interfaces={"root": fem.Interface("a", "y")}
+                )
             ),
             "interface 'root' is on direction 'y' of point 'a', which a support holds",
         ),
@@ -116,43 +132,57 @@ def test_a_bad_model_is_one_sentence(make, sentence):
 def test_a_frame_must_lie_in_one_plane():
     mesh = fem.frame_mesh({"a": (0, 0, 0), "b": (1, 0, 0.1)}, [("bar", "a", "b", 2)], "out.msh")
     with pytest.raises(fem.ModelError, match=r"out.msh: .* one z .* from 0 to 0.1"):
-        fem.FrameModel(mesh, {"bar": BAR})
+        fem.StructureModel(mesh, {"bar": BAR}, plane=True)
 
 
 def test_the_plane_may_be_anywhere():
     mesh = fem.frame_mesh({"a": (0, 0, 7), "b": (1, 0, 7)}, [("bar", "a", "b", 2)])
-    there = fem.assemble(fem.FrameModel(mesh, {"bar": BAR}))
+    there = fem.assemble(fem.StructureModel(mesh, {"bar": BAR}, plane=True))
     here = fem.assemble(beam(elements=2))
     assert abs(there.stiffness - here.stiffness).max() == 0.0
 
 
 def test_a_point_of_several_nodes_cannot_be_used_but_may_be_there():
-    mesh = fem.FrameMesh(
-        [[0, 0, 0], [1, 0, 0]], [[0, 1]], {"bar": [0]}, {"ends": [0, 1]}, source="bar.msh"
+    mesh = fem.StructureMesh(
+        [[0, 0, 0], [1, 0, 0]],
+        {"line": [[0, 1]]},
+        {"bar": {"line": [0]}},
+        {"ends": [0, 1]},
+        source="bar.msh",
     )
-    fem.FrameModel(mesh, {"bar": BAR})
-    with pytest.raises(fem.ModelError, match=r"'ends' must hold exactly one node .* holds 2"):
-        fem.FrameModel(mesh, {"bar": BAR}, point_masses=[fem.PointMass("ends", 1.0)])
+    fem.StructureModel(mesh, {"bar": BAR}, plane=True)
+    with pytest.raises(fem.ModelError, match="'ends' must be a single point, but holds 2 nodes"):
+        fem.StructureModel(
+            mesh, {"bar": BAR}, point_masses=[fem.PointMass("ends", 1.0)], plane=True
+        )
 
 
 def test_a_support_holds_all_points_of_a_set():
     points = {"left": [0], "middle": [1], "right": [2], "ends": [0, 2]}
-    mesh = fem.FrameMesh(
-        [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1], [1, 2]], {"bar": [0, 1]}, points
+    mesh = fem.StructureMesh(
+        [[0, 0, 0], [1, 0, 0], [2, 0, 0]],
+        {"line": [[0, 1], [1, 2]]},
+        {"bar": {"line": [0, 1]}},
+        points,
     )
     apart = [fem.Support("left", CLAMP), fem.Support("right", CLAMP)]
     found, exact = (
-        fem.assemble(fem.FrameModel(mesh, {"bar": BAR}, supports=supports)).stiffness.toarray()
+        fem.assemble(
+            fem.StructureModel(mesh, {"bar": BAR}, supports, plane=True)
+        ).stiffness.toarray()
         for supports in ([fem.Support("ends", CLAMP)], apart)
     )
     assert found.shape == (3, 3)
     assert (found == exact).all()
     with pytest.raises(fem.ModelError, match="which a support holds"):
-        fem.FrameModel(
-            mesh,
-            {"bar": BAR},
-            supports=[fem.Support("ends", "y")],
-            interfaces={"end": fem.Interface("right", "y")},
+        fem.assemble(
+            fem.StructureModel(
+                mesh,
+                {"bar": BAR},
+                supports=[fem.Support("ends", "y")],
+                interfaces={"end": fem.Interface("right", "y")},
+                plane=True,
+            )
         )
 
 

@@ -17,7 +17,7 @@ def half_beam():
         [("beam", "corner", "middle", 6), ("leaf", "corner", "foot", 3)],
     )
     return fem.assemble(
-        fem.FrameModel(
+        fem.StructureModel(
             mesh,
             parts={
                 "beam": fem.BeamPart(STEEL, fem.RectangularSection(width=0.09, height=0.01)),
@@ -29,6 +29,7 @@ def half_beam():
             ],
             point_masses=[fem.PointMass("middle", 0.19)],
             interfaces={"middle": fem.Interface("middle", "y")},
+            plane=True,
         )
     )
 
@@ -42,7 +43,7 @@ def portal():
          ("girder", "c", "e", 1)],
     )  # fmt: skip
     return fem.assemble(
-        fem.FrameModel(
+        fem.StructureModel(
             mesh,
             parts={
                 "column": fem.BeamPart(STEEL, fem.CircularSection(0.2, bore=0.18)),
@@ -56,5 +57,6 @@ def portal():
             point_masses=[fem.PointMass("e", 20.0)],
             hinges=[fem.Hinge("b", "girder")],
             interfaces={"b": fem.Interface("b", "x")},
+            plane=True,
         )
     )

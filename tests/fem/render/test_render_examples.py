@@ -15,7 +15,7 @@ from fem.render import gl_available
 PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "modes.md"
 
 
-@pytest.mark.parametrize("name", ["gl", "frame_surface", "frame_scenery", "pictures"])
+@pytest.mark.parametrize("name", ["gl", "pictures"])
 def test_examples(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(pyvista, "OFF_SCREEN", True)

@@ -6,14 +6,9 @@ import numpy as np
 import pytest
 
 import fem
-from fem.render.frame_surface import (
-    deflection,
-    frame_surface,
-    hermite,
-    hermite_slope,
-    outline,
-    reflected,
-)
+from fem.elements.beams import hermite
+from fem.render.structure_surface import local_deflection, reflected, structure_surface
+from fem.render.swept import outline
 
 
 @pytest.mark.parametrize("coefficients", [*np.eye(4).tolist(), [0.3, -1.0, 2.0, 5.0]])
@@ -22,30 +17,30 @@ def test_hermite_reproduces_cubics(coefficients):
     slope = cubic.deriv()
     values = np.array([cubic(0.0), slope(0.0), cubic(1.0), slope(1.0)])
     s = np.linspace(0, 1, 11)
-    np.testing.assert_allclose(hermite(s) @ values, cubic(s), atol=1e-14)
-    np.testing.assert_allclose(hermite_slope(s) @ values, slope(s), atol=1e-14)
+    cubics, slopes = hermite(s)
+    np.testing.assert_allclose(values @ cubics, cubic(s), atol=1e-14)
+    np.testing.assert_allclose(values @ slopes, slope(s), atol=1e-14)
 
 
-def test_deflection_of_a_turned_element_is_its_cubic():
-    """A cubic across and a linear stretch along an element of length 3 at 0.7 rad."""
-    length, angle = 3.0, 0.7
-    e, n = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
-    across = np.polynomial.Polynomial([0.1, 0.2, -0.3, 0.05])
+def test_deflection_of_an_element_is_its_cubic():
+    """Cubics across and a linear stretch along an element of length 3."""
+    length, s = 3.0, np.linspace(0, 1, 7)
     along = np.polynomial.Polynomial([0.4, -0.1])
-    ends = [[*(along(x) * e + across(x) * n), across.deriv()(x)] for x in (0.0, length)]
-    s = np.linspace(0, 1, 7)
-    x = s[:, None] * length
-    moved, change = deflection(np.array([ends]), np.array([length]), e[None], s)
-    np.testing.assert_allclose(moved[0], along(x) * e + across(x) * n, atol=1e-14)
-    expected = along.deriv()(x) * e + across.deriv()(x) * n
-    np.testing.assert_allclose(change[0], expected, atol=1e-14)
+    up, across = (np.polynomial.Polynomial(c) for c in ([0.1, 0.2, -0.3, 0.05], [0.3, 0, 0.1, -1]))
+    ends = [
+        [along(x), up(x), across(x), 0.0, -across.deriv()(x), up.deriv()(x)] for x in (0.0, length)
+    ]
+    moved, slope, _ = local_deflection(np.array([ends]).reshape(1, 12), np.array([length]), s)
+    curves, x = (along, up, across), s * length
+    np.testing.assert_allclose(moved[0], np.stack([c(x) for c in curves], -1), atol=1e-14)
+    np.testing.assert_allclose(slope[0], np.stack([c.deriv()(x) for c in curves], -1), atol=1e-13)
 
 
 def centres(surface, u, scale=1.0):
     """Axis of the drawn frame: the means of the outlines, in order of parts, elements, places."""
     points, _ = surface.place(u, scale)
     found, start = [], 0
-    for part in surface.parts:
+    for _, part in surface.beams:
         count = int(np.prod(part.shape))
         found.append(points[start : start + count].reshape(*part.shape, 3).mean(axis=2))
         start += count
@@ -55,10 +50,10 @@ def centres(surface, u, scale=1.0):
 def test_sweep_passes_through_the_nodes(half_beam):
     u = np.random.default_rng(1).standard_normal(len(half_beam.free)) * 0.01
     mesh, shape = half_beam.model.mesh, half_beam.shape(u)
-    surface = frame_surface(half_beam)
-    for part, axis in zip(surface.parts, centres(surface, u, scale=3.0), strict=True):
+    surface = structure_surface(half_beam)
+    for (name, _), axis in zip(surface.beams, centres(surface, u, scale=3.0), strict=True):
         for end, place in ((0, 0), (1, -1)):
-            nodes = mesh.lines[part.elements, end]
+            nodes = half_beam.model.beams[name][1][:, end]
             expected = mesh.points[nodes, :2] + 3.0 * shape[nodes, :2]
             np.testing.assert_allclose(axis[:, place, :2], expected, atol=1e-13)
 
@@ -68,16 +63,17 @@ def test_one_element_draws_the_exact_static_deflection():
     mesh = fem.frame_mesh({"root": (0, 0), "tip": (2, 0)}, [("arm", "root", "tip", 1)])
     section = fem.RectangularSection(width=0.05, height=0.02)
     component = fem.assemble(
-        fem.FrameModel(
+        fem.StructureModel(
             mesh,
             parts={"arm": fem.BeamPart(fem.Material(2e11, 7800.0), section)},
             supports=[fem.Support("root", ("x", "y", "rotation"))],
             interfaces={"tip": fem.Interface("tip", "y")},
+            plane=True,
         )
     )
     load = 40.0 * component.interfaces["tip"]
     u = np.linalg.solve(component.stiffness.toarray(), load)
-    surface = frame_surface(component, places=9)
+    surface = structure_surface(component, places=9)
     x = np.linspace(0, 2, 9)
     exact = 40.0 * x**2 * (6 - x) / (6 * 2e11 * section.second_moment)
     np.testing.assert_allclose(centres(surface, u)[0][0, :, 1], exact, rtol=1e-10, atol=1e-15)
@@ -87,16 +83,18 @@ def test_one_element_draws_the_exact_static_deflection():
 
 def test_sections_keep_their_size_and_stand_across_the_drawn_axis(half_beam):
     u = np.random.default_rng(2).standard_normal(len(half_beam.free)) * 0.01
-    surface = frame_surface(half_beam)
+    surface = structure_surface(half_beam)
     points, _ = surface.place(u, scale=5.0)
-    part = surface.parts[0]
+    part = surface.beams[0][1]
     rings = points[: np.prod(part.shape)].reshape(*part.shape, 3)
     edges = np.linalg.norm(np.roll(rings, -1, axis=2) - rings, axis=-1)
     np.testing.assert_allclose(np.sort(edges, axis=-1)[..., 0], 0.01, rtol=1e-12)
     np.testing.assert_allclose(np.sort(edges, axis=-1)[..., -1], 0.09, rtol=1e-12)
-    fine = frame_surface(half_beam, places=2001)
+    fine = structure_surface(half_beam, places=2001)
     chord = np.diff(centres(fine, u, 5.0)[0], axis=1)[..., :2]
-    tall = fine.place(u, 5.0)[0][: np.prod(fine.parts[0].shape)].reshape(*fine.parts[0].shape, 3)
+    tall = fine.place(u, 5.0)[0][: np.prod(fine.beams[0][1].shape)].reshape(
+        *fine.beams[0][1].shape, 3
+    )
     height = (tall[:, :, 2] - tall[:, :, 1])[:, :-1, :2]
     cosine = np.sum(height * chord, axis=-1) / np.linalg.norm(chord, axis=-1) / 0.01
     assert np.max(np.abs(cosine)) < 5e-3
@@ -106,7 +104,7 @@ def test_hinged_part_keeps_its_own_slope(portal):
     """Turning only the hinge's own rotation bends the girder and leaves the columns straight."""
     u = np.zeros(len(portal.free))
     u[-1] = 0.01
-    surface = frame_surface(portal)
+    surface = structure_surface(portal)
     column, girder = centres(surface, u)
     rest_column, rest_girder = centres(surface, 0 * u)
     np.testing.assert_array_equal(column, rest_column)
@@ -124,21 +122,21 @@ def test_outlines_have_the_sections_area_and_second_moment():
 
 def test_mirror_makes_the_whole_beam(half_beam):
     u = np.random.default_rng(3).standard_normal(len(half_beam.free)) * 0.01
-    half, _ = frame_surface(half_beam).place(u)
-    whole = frame_surface(half_beam, mirror="middle")
+    half, _ = structure_surface(half_beam).place(u)
+    whole = structure_surface(half_beam, mirror="middle")
     points, size = whole.place(u)
     assert len(points) == 2 * len(half) == len(size)
     np.testing.assert_allclose(points[len(half) :, 0], 1.32 - half[:, 0])
     np.testing.assert_array_equal(points[len(half) :, 1:], half[:, 1:])
     for cells in whole.faces() + whole.edges():
-        assert cells.max() < len(points)
+        assert cells.max(initial=0) < len(points)
 
 
 def test_reflection_in_a_slanted_plane_is_its_own_inverse():
     points = np.random.default_rng(4).standard_normal((5, 3))
-    normal = np.array([0.6, 0.8])
-    once = reflected(points, np.array([0.3, -0.2]), normal)
-    np.testing.assert_allclose(reflected(once, np.array([0.3, -0.2]), normal), points)
+    origin, normal = np.array([0.3, -0.2, 0.1]), np.array([0.6, 0.8, 0.0])
+    once = reflected(points, origin, normal)
+    np.testing.assert_allclose(reflected(once, origin, normal), points)
     np.testing.assert_allclose(reflected(np.zeros((1, 3)), normal, normal)[0], [1.2, 1.6, 0])
 
 
@@ -154,11 +152,11 @@ def euler_characteristic(surface):
 
 def test_surface_is_closed(half_beam):
     """Each part is a topological sphere: Euler characteristic 2 each."""
-    assert euler_characteristic(frame_surface(half_beam)) == 4
+    assert euler_characteristic(structure_surface(half_beam)) == 4
 
 
 def test_mirror_needs_a_plane_of_symmetry(half_beam):
     with pytest.raises(fem.ModelError, match="'foot' is not on a plane of symmetry"):
-        frame_surface(half_beam, mirror="foot")
-    with pytest.raises(fem.ModelError, match="there is no point 'centre'"):
-        frame_surface(half_beam, mirror="centre")
+        structure_surface(half_beam, mirror="foot")
+    with pytest.raises(fem.ModelError, match="there is no point or face 'centre'"):
+        structure_surface(half_beam, mirror="centre")

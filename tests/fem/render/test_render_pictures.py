@@ -21,11 +21,11 @@ from fem.render import (
     render_modes,
     render_shape,
 )
-from fem.render.frame_scenery import mass_blocks
-from fem.render.frame_surface import frame_surface
 from fem.render.pictures import automatic_scale
+from fem.render.scenery import mass_blocks
 from fem.render.several import Several
 from fem.render.stop_scenery import largest_scale, penetration, stop_bodies
+from fem.render.structure_surface import structure_surface
 
 STEEL = fem.Material(2.1e11, 7800.0)
 
@@ -125,8 +125,8 @@ def test_without_a_path_a_plotter_shows_what_a_file_has(
     plotter = draw(half_beam, sagging)
     actors = plotter.renderers[0].actors
     assert texts <= set(actors)
-    at_rest, _ = frame_surface(half_beam).place(0.0 * sagging)
-    way = unit(frame_surface(half_beam).place(sagging)[0] - at_rest)
+    at_rest, _ = structure_surface(half_beam).place(0.0 * sagging)
+    way = unit(structure_surface(half_beam).place(sagging)[0] - at_rest)
     bodies = [a.mapper.dataset.points for a in actors.values() if isinstance(a, pyvista.Actor)]
     ways = [unit(points - at_rest) for points in bodies if len(points) == len(at_rest)]
     assert max(np.vdot(w, way) for w in ways) == pytest.approx(1.0, abs=1e-6), "not deflected"
@@ -255,7 +255,7 @@ def test_bad_requests(half_beam, sagging, tmp_path):
 
 
 def test_unknown_stop(half_beam, sagging, tmp_path):
-    with pytest.raises(fem.ModelError, match="there is no point 'centre'"):
+    with pytest.raises(fem.ModelError, match="there is no point or face 'centre'"):
         render_shape(half_beam, sagging, tmp_path / "a.png", stops=[StopSphere("centre", 0.01)])
 
 
@@ -274,7 +274,7 @@ def test_bad_stops(fields, sentence):
 
 def test_stop_touches_the_beam_at_rest(half_beam):
     """The sphere's lowest point is the beam's upper surface, or above it by the scaled gap."""
-    drawing = frame_surface(half_beam)
+    drawing = structure_surface(half_beam)
     for gap, scale in ((0.0, 1.0), (2e-4, 50.0)):
         sphere = stop_bodies(drawing, StopSphere("middle", 0.005, gap=gap), scale)[0].solid
         assert sphere.bounds[2] == pytest.approx(0.005 + gap * scale, abs=1e-5)
@@ -285,10 +285,10 @@ def test_stop_touches_the_beam_at_rest(half_beam):
 
 def test_mass_is_a_block_of_steel_away_from_the_stop(half_beam):
     stop = StopSphere("middle", 0.005)
-    (block,) = mass_blocks(frame_surface(half_beam, mirror="middle"), [stop])
+    (block,) = mass_blocks(structure_surface(half_beam, mirror="middle"), [stop])
     assert block.solid.volume * 7800.0 == pytest.approx(2 * 0.19, rel=1e-4)
     assert block.solid.bounds[3] == pytest.approx(-0.005, abs=1e-6)
-    (half,) = mass_blocks(frame_surface(half_beam), [stop])
+    (half,) = mass_blocks(structure_surface(half_beam), [stop])
     assert half.solid.volume * 7800.0 == pytest.approx(0.19, rel=1e-4)
     assert half.solid.bounds[1] == pytest.approx(0.66, abs=1e-6)
     shape = np.zeros((10, 3))
@@ -320,7 +320,9 @@ def tongs():
         mesh = fem.frame_mesh({"root": (0, y), "tip": (0.5, y)}, [("arm", "root", "tip", 4)])
         supports = [fem.Support("root", ("x", "y", "rotation"))]
         ends = {"tip": fem.Interface("tip", "y")}
-        parts[name] = fem.assemble(fem.FrameModel(mesh, {"arm": arm}, supports, interfaces=ends))
+        parts[name] = fem.assemble(
+            fem.StructureModel(mesh, {"arm": arm}, supports, interfaces=ends, plane=True)
+        )
     return Several(parts)
 
 

@@ -27,9 +27,8 @@ from fem.render import (
     write_page,
 )
 from fem.render.colouring import surface_values
-from fem.render.frame_surface import frame_surface
 from fem.render.page import shapes_of
-from fem.render.structure_scenery import reach_along, support_marks
+from fem.render.scenery import reach_along, support_marks
 from fem.render.structure_surface import structure_surface
 from fem.render.views import view_of_motion
 
@@ -110,7 +109,7 @@ def test_moment_and_stress_of_a_beam_in_space_are_those_of_statics(direction):
 
 def test_the_moment_of_a_frame_is_that_of_statics(half_beam):
     u = np.linalg.solve(half_beam.stiffness.toarray(), 100.0 * half_beam.interfaces["middle"])
-    drawing = frame_surface(half_beam)
+    drawing = structure_surface(half_beam)
     moment = surface_values(drawing, u, "moment")
     points, _ = drawing.place(np.zeros_like(u))
     along = points[np.abs(points[:, 1]) < 0.006]
@@ -131,6 +130,36 @@ def test_a_twisted_beam_turns_its_section():
     tip = np.abs(rest[:, 0] - 0.5) < 1e-9
     turn = 0.01 * np.stack([0 * rest[tip, 0], -rest[tip, 2], rest[tip, 1]], axis=1)
     np.testing.assert_allclose(moved[tip] - rest[tip], turn, atol=2e-6)
+
+
+def test_a_mirror_makes_a_whole_of_half_a_block():
+    """The cut through the middle is not drawn: the surface of the whole is one sphere."""
+    half = fem.assemble(
+        fem.StructureModel(
+            fem.box_mesh("bar", (1.0, 0.1, 0.1), (3, 1, 1)),
+            {"bar": fem.SolidPart(fem.Material(2e11, 7800.0, 0.3))},
+            supports=[fem.symmetry("x0", "x")],
+        )
+    )
+    whole = structure_surface(half, mirror="x0")
+    points, size = whole.place(np.ones(len(half.free)))
+    assert points[:, 0].min() == pytest.approx(-points[:, 0].max(), rel=1e-12)
+    assert len(size) == len(points)
+    at_rest, _ = whole.place(np.zeros(len(half.free)))
+    _, merged = np.unique(np.round(at_rest, 9), axis=0, return_inverse=True)
+    faces = [tuple(merged.ravel()[face]) for array in whole.faces() for face in array]
+    edges = {frozenset(pair) for f in faces for pair in zip(f, f[1:] + f[:1], strict=True)}
+    assert len({v for f in faces for v in f}) - len(edges) + len(faces) == 2
+
+
+def test_every_point_of_a_beam_in_space_has_its_displacement():
+    mesh = fem.frame_mesh({"a": (0, 0, 0), "b": (0, 0, 1)}, [("bar", "a", "b", 3)])
+    bar = fem.BeamPart(fem.Material(2e11, 7800.0, 0.3), fem.CircularSection(0.05))
+    component = fem.assemble(fem.StructureModel(mesh, {"bar": bar}))
+    aside = np.append(np.tile([3.0, 4.0, 0.0], 4), np.zeros(12))
+    points, size = structure_surface(component).place(aside)
+    assert len(points) == len(size)
+    np.testing.assert_allclose(size, 5.0)
 
 
 def test_the_surface_of_a_block_is_closed(bar):
@@ -192,7 +221,7 @@ def test_a_comparison_says_how_far_the_two_are_apart(with_gl, bar, tmp_path):
 
 def test_what_cannot_be_drawn_is_one_sentence(bar, half_beam, tmp_path):
     component, u = bar
-    with pytest.raises(fem.ModelError, match="only frames are drawn with a mirror"):
+    with pytest.raises(fem.ModelError, match="'tip' is not on a plane of symmetry"):
         render_shape(component, u, tmp_path / "a.png", mirror="tip")
     with pytest.raises(fem.ModelError, match="no colouring 'heat'; there are 'displacement'"):
         surface_values(structure_surface(component), u, "heat")

@@ -12,7 +12,7 @@ import cms
 import fem
 import nldyn
 from cms import ReducedModel
-from fem.model.store import load_model, load_structure
+from fem.model.store import load_model
 from nldyn import diagram, parameter_study
 from nldyn.app.cli import main
 from nldyn.base.resources import example
@@ -78,7 +78,7 @@ def test_the_malicious_file_would_run_code():
     "load",
     [
         load_branches, load_diagram, load_exploration, load_curves,
-        load_model, load_structure, ReducedModel.load,
+        load_model, ReducedModel.load,
     ],
     ids=lambda load: load.__qualname__,
 )  # fmt: skip

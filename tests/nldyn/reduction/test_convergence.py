@@ -281,11 +281,12 @@ AT_TIP = LoadCase(
 def cantilever(count):
     mesh = fem.frame_mesh({"root": (0, 0), "tip": (0.5, 0)}, [("arm", "root", "tip", count)])
     part = fem.BeamPart(fem.Material(2.1e11, 7800.0), fem.RectangularSection(0.02, 0.01))
-    model = fem.FrameModel(
+    model = fem.StructureModel(
         mesh,
         {"arm": part},
         supports=[fem.Support("root", ("x", "y", "rotation"))],
         interfaces={"tip": fem.Interface("tip", "y")},
+        plane=True,
     )
     return fem.assemble(model)
 

@@ -25,7 +25,7 @@ def cantilever(elements, modes=3, length=1.0):
     mesh = fem.frame_mesh({"root": (0, 0), "tip": (length, 0)}, [("arm", "root", "tip", elements)])
     part = fem.BeamPart(fem.Material(2e11, 7800.0), fem.RectangularSection(0.1, 0.02))
     held = [fem.Support("root", ("x", "y", "rotation"))]
-    component = fem.assemble(fem.FrameModel(mesh, {"arm": part}, held))
+    component = fem.assemble(fem.StructureModel(mesh, {"arm": part}, held, plane=True))
     return Structure(component, cms.reduce(component, modes=modes, method="truncation"))
 
 

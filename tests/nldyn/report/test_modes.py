@@ -31,9 +31,10 @@ def test_effective_masses_of_a_cantilever_are_those_of_euler_and_bernoulli():
     mesh = fem.frame_mesh({"root": (0, 0), "tip": (1, 0)}, [("arm", "root", "tip", 40)])
     part = fem.BeamPart(fem.Material(2e11, 7800.0), fem.RectangularSection(0.1, 0.02))
     component = fem.assemble(
-        fem.FrameModel(
+        fem.StructureModel(
             mesh, {"arm": part}, [fem.Support("root", ("x", "y", "rotation"))],
             interfaces={"tip": fem.Interface("tip", "y")},
+            plane=True,
         )
     )  # fmt: skip
     structure = Structure(component, cms.reduce(component, modes=3, residual=False))

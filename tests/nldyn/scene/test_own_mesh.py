@@ -73,11 +73,12 @@ def test_hook_of_gmsh_is_near_a_frame_of_deep_beams():
         {"foot": (0.01, 0.0), "corner": (0.01, 0.11), "tip": (0.15, 0.11)},
         [("upright", "foot", "corner", 20), ("arm", "corner", "tip", 20)],
     )
-    model = fem.FrameModel(
+    model = fem.StructureModel(
         mesh,
         {"upright": part, "arm": part},
         supports=[fem.Support("foot", ("x", "y", "rotation"))],
         interfaces={"tip": fem.Interface("tip", "y")},
+        plane=True,
     )
     frame = cms.reduce(fem.assemble(model), modes=1).frequencies_hz[0]
     assert first_hz("hook") == pytest.approx(frame, rel=0.05)

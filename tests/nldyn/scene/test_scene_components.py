@@ -68,7 +68,7 @@ amplitude = 2.0
 RANGE = "[continuation]\nrange_hz = [3.0, 8.0]\n"
 
 
-def arm(start: float, end: float, lines: int) -> fem.FrameMesh:
+def arm(start: float, end: float, lines: int) -> fem.StructureMesh:
     return fem.frame_mesh(
         {"left": (start, 0), "right": (end, 0)}, [("arm", "left", "right", lines)]
     )
@@ -86,7 +86,9 @@ def halves(tmp_path, more: str, inner: int = 6, outer: int = 6):
 def cantilever() -> fem.Component:
     """The same in one mesh of four lines."""
     tip = {"tip": fem.Interface("right", "y")}
-    return fem.assemble(fem.FrameModel(arm(0.0, 2 * L, 4), {"arm": STEEL}, [CLAMP], interfaces=tip))
+    return fem.assemble(
+        fem.StructureModel(arm(0.0, 2 * L, 4), {"arm": STEEL}, [CLAMP], interfaces=tip, plane=True)
+    )
 
 
 def test_two_meshes_with_all_modes_are_the_mesh_of_the_whole(tmp_path):

@@ -121,11 +121,11 @@ def test_what_makes_no_area_of_interfaces_is_refused(tmp_path, old, new, said):
         ('direction = "-y" ', "", "needs 'direction'"),
         ('direction = "-y" ', 'direction = "z" ', "nothing of it moves along"),
         ('at = "strip"', 'at = "stripe"', "stripe"),
-        ('at = "strip"', 'at = "tip"', "no beam has all its nodes in it"),
+        ('at = "strip"', 'at = "tip"', "no outer face, edge or beam whose nodes are all in it"),
         ("gap = 1e-4", "gap = [1e-4, 2e-4]", "gap has 2 values, but the area has 40 points"),
         ("radius = 20.0", "radius = 0.1", "beyond the radius"),
         ("modes = 4", "tolerance = 0.01", "does not go with reduction.tolerance"),
-        ("points = 2", 'points = 2\nagainst = "root"', "no beam has all its nodes in it"),
+        ("points = 2", 'points = 2\nagainst = "root"', "nothing of that lies opposite"),
     ],
 )
 def test_what_makes_no_area_of_a_mesh_is_refused(tmp_path, old, new, said):

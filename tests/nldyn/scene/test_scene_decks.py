@@ -80,7 +80,7 @@ def test_parts_of_the_deck_are_those_given_by_hand(folder):
 def test_a_finer_frame_keeps_what_the_deck_attaches(folder):
     finer = build_component(load_scene(folder / "given.toml"), refinement=3)
     assert len(finer.model.mesh.attachments.point_masses) == 1 and finer.damping is not None
-    assert len(finer.model.mesh.element_types["B21"]) == 30
+    assert len(finer.model.mesh.element_types["B21"]["line"]) == 30
 
 
 def test_check_tells_what_is_left_out_and_what_is_taken(folder):

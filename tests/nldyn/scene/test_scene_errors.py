@@ -272,7 +272,8 @@ def test_fault_in_modal_scene(tmp_path, old, new, sentence):
         (
             'at = "foot"',
             'at = "fooot"',
-            "supports[1].at 'fooot' is not a point set of the mesh MESH; did you mean 'foot'?",
+            "supports[1].at 'fooot' is not a point or face of the mesh MESH, of [places] or of "
+            "[[couplings]]; did you mean 'foot'?",
         ),
         (
             "[parts.leaf]",
@@ -297,9 +298,9 @@ def test_fault_in_modal_scene(tmp_path, old, new, sentence):
         ),
         (
             'at = "foot"',
-            'at = "leaf"',
-            "supports[1].at 'leaf' is not a point set of the mesh MESH; known: 'corner', 'middle', "
-            "'foot'",
+            'at = "clamp"',
+            "supports[1].at 'clamp' is not a point or face of the mesh MESH, of [places] or of "
+            "[[couplings]]; known: 'corner', 'middle', 'foot', 'beam', 'leaf'",
         ),
         ("modes = 1", "modes = -1", "reduction.modes must be at least 0, not -1"),
         (
@@ -364,7 +365,10 @@ def test_part_without_material(tmp_path):
     start, end = BEAM.index("[parts.leaf]"), BEAM.index("# Symmetry")
     said = check(tmp_path, BEAM[:start] + BEAM[end:])
     path = mesh("half_beam.msh").as_posix()
-    assert said == f"scene.toml: parts.leaf is missing: the mesh {path} has a part 'leaf'"
+    assert said == (
+        f"scene.toml: {path}: line 72 is in no part of the model, whose parts are 'beam' (the mesh"
+        " has 'beam', 'leaf')"
+    )
 
 
 def test_mode_count_too_large(tmp_path):
@@ -538,4 +542,4 @@ def test_all_unknown_names_are_told_at_once(tmp_path):
     names = BEAM.replace("[parts.leaf]", "[parts.lief]").replace('at = "foot"', 'at = "foto"')
     found = check(tmp_path, names)
     assert "parts.lief is not a part of the mesh" in found and "did you mean 'leaf'?" in found
-    assert "'foto' is not a point set of the mesh" in found and "did you mean 'foot'?" in found
+    assert "'foto' is not a point or face of the mesh" in found and "did you mean 'foot'?" in found

@@ -117,7 +117,6 @@ def test_what_is_ignored_is_not_there_and_is_told(tmp_path):
         ("at = [1.0, 0.05, 0.05]", "at = [0.9, 0.05, 0.05]", "no node is at"),
         ("at = [1.0, 0.05, 0.05]", "", "needs one of 'at' and 'box'"),
         ('model = "structure"', 'model = "structure"\nmerge = true\nseparate = true', "keep one"),
-        ('model = "structure"', 'pinned = ["bar"]', "has 'pinned', which needs model = \"str"),
         ('model = "structure"', 'model = "structure"\npinned = ["ba"]', "'ba' of 'pinned' is no"),
     ],
 )
