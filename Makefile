@@ -57,9 +57,11 @@ hard: $(VENV)/.installed
 faults: $(VENV)/.installed
 	$(BIN)/python -m pytest tests/faults -m "slow or not slow" -o addopts=-q
 
-# the engine with the sanitizers of addresses and of undefined behaviour: tests and random systems
+# the engine with the sanitizers of addresses and of undefined behaviour: tests and random systems;
+# that of addresses must find the library of C++ before others throw exceptions
 SANITIZED = NLDYN_ENGINE=results/sanitized OPENBLAS_NUM_THREADS=1 ASAN_OPTIONS=detect_leaks=0 \
-	LD_PRELOAD=$(shell $(CC) -print-file-name=libasan.so) $(BIN)/python
+	LD_PRELOAD="$(foreach library,libasan.so libstdc++.so.6,$(shell $(CC) -print-file-name=$(library)))" \
+	$(BIN)/python
 sanitize: $(VENV)/.installed
 	NLDYN_ENGINE=results/sanitized $(BIN)/python compile_engine.py -O1 -g \
 		-fsanitize=address,undefined -fno-sanitize-recover=undefined

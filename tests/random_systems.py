@@ -3,17 +3,22 @@
 None may crash, hang or break the rules of C, which a library that is built with sanitizers tells
 (`make sanitize`); what comes out is nobody's concern here. The engine is called below the checks
 of the package: sizes and indices are right, all other numbers may be NaN, infinite, zero, huge.
+Bad numbers may ask for as many panels as the engine's bounds allow, which is hours: each system is
+interrupted after a quarter of a second.
 """
 
 from __future__ import annotations
 
 import collections
+import signal
 import sys
+import time
+from typing import Any
 
 import numpy as np
 
 from nldyn.base.errors import SystemModelError
-from nldyn.engine.layout import StopRow, SystemData, empty_record
+from nldyn.engine.layout import INTERRUPTED, StopRow, SystemData, empty_record
 from nldyn.engine.newton import Corrector, newton, packed_record, packed_system
 from nldyn.engine.sample import local_extremes, sample_states
 from nldyn.flow.flow_map import FlowMap
@@ -25,6 +30,8 @@ from nldyn.system.springs_dampers import PolynomialSpring
 from nldyn.system.stop import Stop
 from nldyn.system.system import System
 
+SECONDS = 0.25  # of the processor for each system
+LATE = 5.0  # of these: no call may go on for so long after the signal
 BAD = np.array([np.nan, np.inf, -np.inf, 0.0, 1e308, -1e308, 5e-324, 1e-300, -1.0])
 NUMBERS = "blocks", "rows", "bound3", "force", "orders", "drive"
 COLUMNS = [StopRow._fields.index(name) for name in (
@@ -106,11 +113,26 @@ def try_system(rng: np.random.Generator) -> int:
     return found.outcome
 
 
+def stop(*_: Any) -> None:
+    """End a system as Ctrl-C would."""
+    raise KeyboardInterrupt
+
+
 def main() -> None:
     """Try so many systems and tell the outcomes."""
     outcomes: collections.Counter[int] = collections.Counter()
+    signal.signal(signal.SIGVTALRM, stop)
     for seed in range(int(sys.argv[1])):
-        outcomes[try_system(np.random.default_rng(seed))] += 1
+        begun = time.process_time()
+        try:
+            signal.setitimer(signal.ITIMER_VIRTUAL, SECONDS)
+            outcome = try_system(np.random.default_rng(seed))
+            signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        except KeyboardInterrupt:
+            outcome = INTERRUPTED
+        outcomes[outcome] += 1
+        if time.process_time() - begun > SECONDS + LATE:
+            sys.exit(f"system {seed} took {time.process_time() - begun:.1f} s")
         if seed % 500 == 499:
             print(seed + 1, dict(sorted(outcomes.items())), flush=True)
 

@@ -202,6 +202,8 @@ typedef struct {
     double *inverted; /* (outputs, m) slopes for which it was filled, or nan in the first */
     int made_kind;    /* kind and length for which there, to, back and G were filled */
     double made_length;
+    double *whole;    /* (n, 6) exp(A h), and the diagonal of that less 1 */
+    bool weighed;     /* whether the tails of its responses are known, see `fill_response_tails` */
     double *rise;     /* (na, 2n, m) row (exp(A t_i) - 1) of the penetrations */
     /* (na,) penetration at the start and its rounding error, the same at the end: carried apart
      * from the state, in which rounding is a share of the displacement */
@@ -217,7 +219,7 @@ typedef struct {
     double *free, *new_slope, *solved, *step, *led;    /* solve_panel */
     double *guess, *rounding, *noise, *inner, *values; /* contact_panel, first_event */
     double *fine, *driven;
-    double *slopes, *forced, *swayed, *square;         /* resolved */
+    double *slopes, *forced, *swayed;                  /* resolved */
     double *viscosity, *off, *hold_matrix, *shift, *kick; /* hold_speeds */
     int *hold_order;
     double *forces, *part, *change;                    /* panel_columns */

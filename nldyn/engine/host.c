@@ -6,7 +6,7 @@
 #endif
 
 #define PAUSE 0.05 /* s between two looks whether Ctrl-C was pressed */
-#define LARGE 32   /* inner length from which a product of matrices is left to BLAS */
+#define WORTH 4096 /* multiplications from which a product of matrices is left to BLAS */
 
 static double seconds_now(void)
 {
@@ -41,33 +41,47 @@ static bool interrupted(Watch *watch)
     return watch->stopped;
 }
 
+/* C = keep C + factor A B by BLAS, which has matrices column by column, or A^T B; whether that is
+ * worth its call. Rows of A lie `apart`. */
+static bool left_to_blas(const Watch *watch, double factor, const double *A, const char *turned,
+                         int apart, const double *B, double keep, double *C, int rows, int inner,
+                         int columns)
+{
+    if (!watch->host->dgemm || (double)rows * inner * columns < WORTH) return false;
+    watch->host->dgemm("N", turned, &columns, &rows, &inner, &factor, B, &columns, A, &apart, &keep,
+                       C, &columns);
+    return true;
+}
+
 /* C (rows, columns) = A (rows, inner) B (inner, columns) */
 static void multiply(const Watch *watch, const double *A, const double *B, double *C, int rows,
                      int inner, int columns)
 {
-    if (watch->host->dgemm && inner >= LARGE && rows > 1) { /* BLAS has matrices column by column */
-        double one = 1.0, zero = 0.0;
-        watch->host->dgemm("N", "N", &columns, &rows, &inner, &one, B, &columns, A, &inner, &zero,
-                           C, &columns);
-        return;
-    }
+    if (left_to_blas(watch, 1.0, A, "N", inner, B, 0.0, C, rows, inner, columns)) return;
     for (int i = 0; i < rows; i++)
         combine(C + (size_t)i * columns, NULL, columns, B, columns, A + (size_t)i * inner, 1,
                 inner);
 }
 
-/* C (rows, columns) = A^T B of A (inner, rows) and B (inner, columns) */
-static void multiply_transposed(const Watch *watch, const double *A, const double *B, double *C,
-                                int rows, int inner, int columns)
+/* C (rows, columns) = A^T B of A (inner, rows), whose rows lie `apart`, and B (inner, columns) */
+static void multiply_transposed(const Watch *watch, const double *A, int apart, const double *B,
+                                double *C, int rows, int inner, int columns)
 {
-    if (watch->host->dgemm && inner >= LARGE && rows > 1) {
-        double one = 1.0, zero = 0.0;
-        watch->host->dgemm("N", "T", &columns, &rows, &inner, &one, B, &columns, A, &rows, &zero,
-                           C, &columns);
-        return;
-    }
+    if (left_to_blas(watch, 1.0, A, "T", apart, B, 0.0, C, rows, inner, columns)) return;
     for (int i = 0; i < rows; i++)
-        combine(C + (size_t)i * columns, NULL, columns, B, columns, A + i, rows, inner);
+        combine(C + (size_t)i * columns, NULL, columns, B, columns, A + i, apart, inner);
+}
+
+/* take A B of A (rows, inner) and B (inner, columns) from C (rows, columns); spare (columns,) */
+static void take_product(const Watch *watch, const double *A, const double *B, double *C, int rows,
+                         int inner, int columns, double *spare)
+{
+    if (left_to_blas(watch, -1.0, A, "N", inner, B, 1.0, C, rows, inner, columns)) return;
+    for (int i = 0; i < rows; i++) {
+        double *row = C + (size_t)i * columns;
+        combine(spare, NULL, columns, B, columns, A + (size_t)i * inner, 1, inner);
+        for (int c = 0; c < columns; c++) row[c] -= spare[c];
+    }
 }
 
 /* whether the processor and the system have all that the wider form of the library is compiled

@@ -246,21 +246,6 @@ static double fastest_moved(const System *sys)
     return fastest;
 }
 
-/* change of a penetration in a flight of duration t from the state w, to its own precision */
-static double flown(const Flow *fl, int stop, double phase, const double *w, double t)
-{
-    double value = product(forced_of(fl, 0, 0, stop), swung(turn_at(fl, phase), fl->omega * t)).re;
-    if (fl->n_terms > 0) value += swollen(fl, stop, phase, t);
-    const double *row = row_of(fl, 0, stop);
-    for (int b = 0; b < fl->n; b++) {
-        int j = 2 * b;
-        ThereAndBack e = there_and_back(block_of(fl, b), t);
-        value += row[j] * (e.less_a * w[j] + e.there.b * w[j + 1]);
-        value += row[j + 1] * (e.there.c * w[j] + e.less_d * w[j + 1]);
-    }
-    return value;
-}
-
 /* response of an output to the excitation at a forcing phase */
 static double forced_output(const Flow *fl, int out, double phase)
 {

@@ -91,7 +91,7 @@ static void fill_influences(const Flow *fl, const Gauss *tab, int kind, double h
     const double *integrate = tab->integrate + (size_t)kind * m * m, *product = s->product;
     for (int o = 0; o < panel->outputs; o++)
         for (int a = 0; a < na; a++) {
-            multiply_transposed(fl->watch, panel->back + (size_t)a * fl->size * m,
+            multiply_transposed(fl->watch, panel->back + (size_t)a * fl->size * m, m,
                                 panel->to + (size_t)o * fl->size * m, s->product, m, fl->size, m);
             double *restrict G = panel->G + (size_t)a * m * height + o * m;
             for (int j = 0; j < m; j++)
@@ -104,7 +104,8 @@ static void fill_influences(const Flow *fl, const Gauss *tab, int kind, double h
         }
 }
 
-/* fill what a panel of length h needs to know of the linear part: there, to, rise, back and G */
+/* fill what a panel of length h needs to know of the linear part: there, to, rise, back, whole and
+ * G */
 static void panel_responses(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel,
                             Scratch *s)
 {
@@ -113,12 +114,17 @@ static void panel_responses(const Flow *fl, const Gauss *tab, int kind, double h
     panel->made_kind = kind;
     panel->made_length = h;
     panel->inverted[0] = NAN;
+    panel->weighed = false;
     double *back = s->waves + 4 * m, *less = back + 4 * m;
     for (int i = 0; i < m; i++) s->times[i] = h * tab->chi[kind * m + i];
     for (int b = 0; b < fl->n; b++) {
         double *there = panel->there + (size_t)4 * b * m;
         fill_there_and_back(block_of(fl, b), s->times, m, there, back, less, s->waves);
         fill_block_responses(fl, panel, b, there, back, less);
+        Square end = block_exponential(block_of(fl, b), h);
+        ThereAndBack swing = there_and_back(block_of(fl, b), h);
+        double whole[6] = {end.a, end.b, end.c, end.d, swing.less_a, swing.less_d};
+        memcpy(panel->whole + 6 * b, whole, sizeof whole);
     }
     fill_influences(fl, tab, kind, h, panel, s);
 }
@@ -401,6 +407,7 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
     if (panel->outputs > panel->na) guess_rates(fl, panel, s);
     double before = INFINITY;
     for (int iteration = 0; iteration < 60; iteration++) {
+        if (iteration % 8 == 7 && interrupted(fl->watch)) break; /* a step of 40 stops takes long */
         panel_forces(fl, panel, s->new_slope);
         bool fresh = !panel->kept;
         if (fresh) {

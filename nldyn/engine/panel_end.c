@@ -64,6 +64,35 @@ static void hold_speeds(const Flow *fl, const Gauss *tab, int kind, double end_p
     }
 }
 
+/* what the modes' free vibration over a panel, from the state w, and the excitation change a
+ * penetration by, to its own precision */
+static double flown(const Flow *fl, const Panel *panel, int stop, double phase, const double *w,
+                    double h)
+{
+    double value = product(forced_of(fl, 0, 0, stop), swung(turn_at(fl, phase), fl->omega * h)).re;
+    if (fl->n_terms > 0) value += swollen(fl, stop, phase, h);
+    const double *row = row_of(fl, 0, stop), *e = panel->whole;
+    for (int j = 0; j < fl->size; j += 2, e += 6) {
+        value += row[j] * (e[4] * w[j] + e[1] * w[j + 1]);
+        value += row[j + 1] * (e[2] * w[j] + e[5] * w[j + 1]);
+    }
+    return value;
+}
+
+/* let columns (2n, count) vibrate freely over a panel, in place */
+static void swing(const Flow *fl, const Panel *panel, double *columns, int count)
+{
+    const double *e = panel->whole;
+    for (int b = 0; b < fl->n; b++, e += 6) {
+        double *restrict first = columns + (size_t)2 * b * count, *restrict second = first + count;
+        for (int c = 0; c < count; c++) {
+            double x = first[c], y = second[c];
+            first[c] = e[0] * x + e[1] * y;
+            second[c] = e[2] * x + e[3] * y;
+        }
+    }
+}
+
 /* state w_end and penetrations at the end of a panel from the forces at its nodes; `decay` has
  * been filled */
 static void panel_end(const Flow *fl, const Gauss *tab, int kind, double phase, const double *w,
@@ -74,19 +103,24 @@ static void panel_end(const Flow *fl, const Gauss *tab, int kind, double phase, 
     for (int a = 0; a < na; a++)
         for (int j = 0; j < m; j++)
             s->step[a * m + j] = h * tab->weights[kind * m + j] * panel->F[a * m + j];
-    for (int k = 0; k < fl->size; k++) {
-        double kick = 0.0; /* what the forces have added, taken back to the start */
+    for (int k = 0; k < fl->size; k += 2) {
+        double kick[2] = {0.0, 0.0}; /* what the forces have added, taken back to the start */
         for (int a = 0; a < na; a++) {
             const double *back = panel->back + ((size_t)a * fl->size + k) * m;
-            for (int j = 0; j < m; j++) kick -= s->step[a * m + j] * back[j];
+            for (int j = 0; j < m; j++) {
+                kick[0] -= s->step[a * m + j] * back[j];
+                kick[1] -= s->step[a * m + j] * back[m + j];
+            }
         }
-        w_end[k] = w[k] + kick;
-        for (int a = 0; a < na; a++)
-            panel->end_depth[a] += row_of(fl, 0, panel->active[a])[k] * kick;
+        for (int i = 0; i < 2; i++) {
+            w_end[k + i] = w[k + i] + kick[i];
+            for (int a = 0; a < na; a++)
+                panel->end_depth[a] += row_of(fl, 0, panel->active[a])[k + i] * kick[i];
+        }
     }
     for (int a = 0; a < na; a++)
-        panel->end_depth[a] += flown(fl, panel->active[a], phase, w_end, h);
-    fly_state(fl->blocks, fl->n, w_end, h);
+        panel->end_depth[a] += flown(fl, panel, panel->active[a], phase, w_end, h);
+    swing(fl, panel, w_end, 1);
     hold_speeds(fl, tab, kind, phase + fl->omega * h, h, panel, w_end, s);
 }
 
@@ -133,8 +167,8 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
     int na = panel->na, m = panel->m, width = na * m;
     memset(s->forces, 0, sizeof(double) * width * n_columns);
     for (int o = 0; o < panel->outputs; o++) {
-        multiply_transposed(fl->watch, panel->to + (size_t)o * m * fl->size, columns, s->part, m,
-                            fl->size, n_columns);
+        multiply_transposed(fl->watch, panel->to + (size_t)o * m * fl->size, m, columns, s->part,
+                            m, fl->size, n_columns);
         for (int i = 0; i < m; i++) {
             double *forces = s->forces + (size_t)((o % na) * m + i) * n_columns;
             double slope = panel->slope[o * m + i], t = h * tab->chi[kind * m + i];
@@ -146,17 +180,16 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
     add_friction(fl, panel, s->forces, n_columns, 1, n_columns);
     invert_panel(fl, panel);
     for (int a = 0; a < na; a++) {
+        multiply_transposed(fl->watch, panel->inverse + a * m, padded(width), s->forces, s->part,
+                            m, width, n_columns);
         for (int j = 0; j < m; j++) {
             double *part = s->part + (size_t)j * n_columns, weight = h * tab->weights[kind * m + j];
-            combine(part, NULL, n_columns, s->forces, n_columns, panel->inverse + a * m + j,
-                    padded(width), width);
             for (int c = 0; c < n_columns; c++) part[c] *= weight;
         }
-        multiply(fl->watch, panel->back + (size_t)a * fl->size * m, s->part, s->change, fl->size,
-                 m, n_columns);
-        for (int k = 0; k < fl->size * n_columns; k++) columns[k] -= s->change[k];
+        take_product(fl->watch, panel->back + (size_t)a * fl->size * m, s->part, columns, fl->size,
+                     m, n_columns, s->change);
     }
-    fly_columns(fl->blocks, fl->n, columns, n_columns, h);
+    swing(fl, panel, columns, n_columns);
 }
 
 /* fill `driven` (2n, m): the states at the nodes of a panel, taken back to its start */
@@ -164,18 +197,17 @@ static void drive_back(const Flow *fl, const Gauss *tab, int kind, const double 
                        const Panel *panel, Scratch *s)
 {
     int m = panel->m;
-    const double *integrate = tab->integrate + (size_t)kind * m * m;
+    double *impulses = s->step;
     for (int k = 0; k < fl->size; k++) {
         double *driven = s->driven + (size_t)k * m;
-        for (int i = 0; i < m; i++) driven[i] = w[k];
+        for (int j = 0; j < m; j++) impulses[j] = 0.0;
         for (int a = 0; a < panel->na; a++) {
             const double *back = panel->back + ((size_t)a * fl->size + k) * m;
             const double *F = panel->F + (size_t)a * m;
-            for (int j = 0; j < m; j++) {
-                double impulse = h * F[j] * back[j];
-                for (int i = 0; i < m; i++) driven[i] -= integrate[j * m + i] * impulse;
-            }
+            for (int j = 0; j < m; j++) impulses[j] -= h * F[j] * back[j];
         }
+        combine(driven, NULL, m, tab->integrate + (size_t)kind * m * m, m, impulses, 1, m);
+        for (int i = 0; i < m; i++) driven[i] += w[k];
     }
 }
 

@@ -86,18 +86,27 @@ static bool nearly_opens(const Gauss *tab, int kind, const double *values, doubl
     return false;
 }
 
-/* Legendre tail, beside its largest, of the response (2n, m) of the modes to a stop; each mode
- * counts by its share in the mobility */
-static double response_tail(const Flow *fl, const Gauss *tab, int stop, const double *back)
+/* Legendre tail, beside its largest, of the response (2n, m) of the modes to a stop, or of its
+ * square; each mode counts by its share in the mobility */
+static double response_tail(const Flow *fl, const Gauss *tab, int stop, const double *response,
+                            bool of_square)
 {
     double worst = 0.0, mobility = TINY;
     int m = (int)tab->m;
+    const double *last = tab->to_legendre + (size_t)(m - 1) * m, *before = last - m;
     for (int b = 0; b < fl->n; b++) {
         double tail = 0.0, size = TINY, share = 0.0;
         for (int k = 2 * b; k < 2 * b + 2; k++) {
-            double row = fabs(row_of(fl, 1, stop)[k]);
-            tail = larger(tail, row * legendre_tail(tab, back + (size_t)k * m));
-            size = larger(size, row * largest(back + (size_t)k * m, m));
+            const double *values = response + (size_t)k * m;
+            double row = fabs(row_of(fl, 1, stop)[k]), ends[2] = {0.0, 0.0}, top = 0.0;
+            for (int j = 0; j < m; j++) {
+                double value = of_square ? values[j] * values[j] : values[j];
+                ends[0] += before[j] * value;
+                ends[1] += last[j] * value;
+                top = larger(top, fabs(value));
+            }
+            tail = larger(tail, row * larger(fabs(ends[0]), fabs(ends[1])));
+            size = larger(size, row * top);
             share += row * fabs(push_of(fl, stop)[k]);
         }
         worst = larger(worst, share * tail / size);
@@ -120,19 +129,18 @@ static bool sways_unseen(const Flow *fl, const Gauss *tab, int kind, double h, c
     return h * sqrt(stiffness) > larger(longest, HALF_CONTACT);
 }
 
-/* fill the tails of the responses to the stops and of their squares, each (na,) */
-static void fill_response_tails(const Flow *fl, const Gauss *tab, const Panel *panel, Scratch *s)
+/* fill the tails of the responses to the stops and of their squares, each (na,), of a new panel */
+static void fill_response_tails(const Flow *fl, const Gauss *tab, Panel *panel, Scratch *s)
 {
-    size_t count = (size_t)fl->size * panel->m;
-    for (int a = 0; a < panel->na; a++) {
-        const double *back = panel->back + a * count;
-        double tail = larger(response_tail(fl, tab, panel->active[a], back), fl->tail);
+    for (int a = 0; a < panel->na && !panel->weighed; a++) {
+        int stop = panel->active[a];
+        const double *back = panel->back + (size_t)a * fl->size * panel->m;
+        double tail = larger(response_tail(fl, tab, stop, back, false), fl->tail);
         s->forced[a] = s->swayed[a] = tail;
-        if (tail > fl->tail) { /* what a slope acts on sways like what it leads to */
-            for (size_t i = 0; i < count; i++) s->square[i] = back[i] * back[i];
-            s->swayed[a] = larger(tail, response_tail(fl, tab, panel->active[a], s->square));
-        }
+        if (tail > fl->tail) /* what a slope acts on sways like what it leads to */
+            s->swayed[a] = larger(tail, response_tail(fl, tab, stop, back, true));
     }
+    panel->weighed = true;
 }
 
 /* largest penetration at the nodes */
@@ -209,7 +217,7 @@ static bool output_resolved(const Flow *fl, const Gauss *tab, int kind, double h
  * the tail, with them. What a force or a slope does over a panel is off by the product of its tail
  * and that of the response to it, or of the response's square. */
 static bool resolved(const Flow *fl, const Gauss *tab, int kind, double h, const double *noise,
-                     const Panel *panel, Scratch *s)
+                     Panel *panel, Scratch *s)
 {
     if (sways_unseen(fl, tab, kind, h, panel)) return false;
     const double *stretch = tab->slope + (size_t)kind * panel->m;

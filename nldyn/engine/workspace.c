@@ -68,6 +68,7 @@ static void lay_out_panel(Block *block, const Flow *fl, int m, Panel *panel)
     panel->G = numbers(block, outputs * nodes);
     panel->inverse = numbers(block, nodes * padded((int)nodes));
     panel->order = indices(block, nodes);
+    panel->whole = numbers(block, 3 * size);
     panel->rise = numbers(block, nodes * size);
     panel->depth = numbers(block, na);
     panel->doubt = numbers(block, na);
@@ -98,7 +99,6 @@ static void lay_out_contacts(Block *block, const Flow *fl, const Gauss *tab, Scr
     s->slopes = numbers(block, 4 * nodes);
     s->forced = numbers(block, na);
     s->swayed = numbers(block, na);
-    s->square = numbers(block, size * m);
     s->viscosity = numbers(block, na);
     s->off = numbers(block, na);
     s->hold_matrix = numbers(block, na * na);
@@ -112,7 +112,7 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     size_t na = fl->n_stops, size = fl->size;
     s->forces = numbers(block, na * m * n_columns);
     s->part = numbers(block, (size_t)m * n_columns);
-    s->change = numbers(block, size * n_columns);
+    s->change = numbers(block, n_columns);
     s->stop_forces = numbers(block, na);
     s->pushes = numbers(block, na);
     s->first_pushes = numbers(block, na);

@@ -49,7 +49,7 @@ from nldyn.engine.library import Packed
 from nldyn.engine.newton import Corrector, Found, newton, packed_record, packed_system
 from nldyn.engine.sample import local_extremes, sample_states
 from nldyn.flow.gauss import GaussTables, gauss_tables
-from nldyn.flow.options import FlowOptions, _floats, _nodes_for_switch
+from nldyn.flow.options import FlowOptions, PanelBounds, _floats, _nodes_for_switch
 from nldyn.flow.packing import (
     bond_row,
     of_areas,
@@ -248,11 +248,16 @@ class FlowMap:
         exponents = [stop.exponent for stop in self.system.elastic_stops.values()]
         smooth = all(float(2.0 * exponent).is_integer() for exponent in exponents)
         power = 2 if smooth else 4
-        nodes, tail = self.options.panel_nodes, self.options.panel_tail
+        nodes, tail, _ = self._bounds
         for stop in self.system.elastic_stops.values():
             viscous = stop.dissipation != 0.0 or stop.dashpot != 0.0
             nodes = _nodes_for_switch(stop.exponent, power, viscous, nodes, tail)
         return gauss_tables(nodes, power)
+
+    @cached_property
+    def _bounds(self) -> PanelBounds:
+        """What bounds its panels."""
+        return self.options.panels_for(self.system.size)
 
     @cached_property
     def rows(self) -> Real:
@@ -402,8 +407,8 @@ class FlowMap:
             np.zeros((1, 3, 2 * s.size), dtype=complex),
             np.hstack([np.array(stops, dtype=float).reshape(-1, len(StopRow._fields)), powers]),
             np.array([law_address(e.law) for e in s.stops] + [0] * unlawful, dtype=np.int64),
-            self.options.panel_tail,
-            self.options.node_angle,
+            self._bounds.tail,
+            self._bounds.node_angle,
         )
 
     def shoot(

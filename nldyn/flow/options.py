@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import gamma, rgamma
@@ -16,9 +17,28 @@ from nldyn.engine.layout import ROUND
 FINEST, COARSEST = 1e-13, 1e-2  # relative tolerances that can be met, and that tell orbits apart
 TAIL = 0.3  # of √rtol: the error of a Jacobian goes with the square of a panel's tail
 NODE_ANGLE, NODE_ANGLE_PER_DECADE = 0.95, 0.08  # rad at rtol = 1e-9, and more per power of ten
+FEW_MODES, MOST_NODES = 20, 40  # modes with which panels have the usual nodes; most nodes
 LATEST = 1e-6  # error in the instant of an event, at most, as a share of the panel
 SHARE = 0.01  # of rtol: what the start of an event may add to the error of a Jacobian
 FINER, ITS_TAIL = 1e-3, 0.03  # times the tolerance and the tail: errors that are negligible
+
+
+class PanelBounds(NamedTuple):
+    """What bounds the panels of a system.
+
+    Parameters
+    ----------
+    nodes : int
+        Gauss nodes on each.
+    tail : float
+        Largest relative Legendre tail of a force.
+    node_angle : float
+        Phase of the fastest mode from node to node, in rad.
+    """
+
+    nodes: int
+    tail: float
+    node_angle: float
 
 
 @dataclass(frozen=True)
@@ -31,8 +51,8 @@ class FlowOptions:
         Relative error to aim at in the state after a period, 1e-13 to 1e-2; that of the Jacobian
         is about ten times as large. It sets the two others unless these are given.
     nodes : int, optional
-        Gauss nodes on a contact panel, 4 to 40, and more where the exponent of a stop needs them;
-        the end of a panel is accurate to order 2 nodes.
+        Gauss nodes on a contact panel, 4 to 40, and more where the exponent of a stop needs them
+        or, unless given, a system has many modes; the end of a panel is accurate to order 2 nodes.
     tail : float, optional
         A panel is halved until the last two Legendre coefficients of its force are below this
         fraction of the largest force. The error at its end goes with the square.
@@ -53,7 +73,7 @@ class FlowOptions:
                 f"FlowOptions: rtol must lie between 1e-13 and 1e-2, got {shown(self.rtol)}"
             )
         if self.nodes is not None:
-            check_whole("FlowOptions: nodes", self.nodes, 4, 40)
+            check_whole("FlowOptions: nodes", self.nodes, 4, MOST_NODES)
         if self.tail is not None and not (is_finite(self.tail) and 0.0 < self.tail < 1.0):
             raise SystemModelError(
                 f"FlowOptions: tail must lie between 0 and 1, got {shown(self.tail)}"
@@ -78,11 +98,25 @@ class FlowOptions:
         """
         return NODE_ANGLE + NODE_ANGLE_PER_DECADE * (math.log10(self.rtol) + 9.0)
 
+    def panels_for(self, modes: int) -> PanelBounds:
+        """What bounds panels of a system with so many modes, if neither nodes nor tail is given.
+
+        Where the fastest mode bounds a panel, one of twice the nodes is more than twice as long:
+        the angle goes to 2, short of the π of half an oscillation. Its tail is a third then, so
+        that errors with up to 64 modes are what they are with 14 nodes.
+        """
+        few = self.panel_nodes
+        if self.nodes is not None or self.tail is not None:
+            return PanelBounds(few, self.panel_tail, self.node_angle)
+        more = max(0, min(modes - FEW_MODES, MOST_NODES - few))
+        angle = 2.0 - (2.0 - self.node_angle) * (few / (few + more)) ** 0.4
+        return PanelBounds(few + more, self.panel_tail * 0.3 ** min(more / 6.0, 1.0), angle)
+
     @property
     def finer(self) -> FlowOptions:
         """A setting whose errors are negligible beside those of this one."""
         rtol, tail = max(FINER * self.rtol, FINEST), ITS_TAIL * self.panel_tail
-        return FlowOptions(rtol, min(self.panel_nodes + 4, 40), tail)
+        return FlowOptions(rtol, min(self.panel_nodes + 4, MOST_NODES), tail)
 
     def instant(self, exponent: float) -> float:
         """Error allowed in the instant of an event, as a share of the panel before it.

@@ -293,7 +293,7 @@ def _table_of_block(
     nodal = pieces.force[panels, stop]
     nodes = pieces.time[panels, None] + pieces.duration[panels, None] * flow.tables.chi[kind]
     rate = _rates(flow, motion.states(nodes.ravel()), stop).reshape(nodes.shape)
-    fine = fine_table(flow.options.panel_nodes)
+    fine = fine_table(flow.tables.nodes.size)
     depth, force = pieces.depth[panels, stop] @ fine.T, nodal @ fine.T
     work = 0.5 * (force[:, 1:] + force[:, :-1]) * np.diff(depth, axis=1)
     return PanelTable(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bench.models import load_case
+from bench.studies import TUBE_HZ, tube
 from independent import Motion
 
 from nldyn import (
@@ -179,6 +180,20 @@ def test_a_soft_contact_resolves_the_fast_mode_that_it_starts(duration):
     assert np.abs((flow.to_modal(shot.ends)[0] - end) / own).max() < 1e-9
     found = basis.right @ shot.jacobians[0] @ basis.left
     assert np.abs((found - tangent) * own / own[:, None]).max() < 3e-9
+
+
+def test_panels_of_many_nodes_with_many_modes_are_as_exact():
+    """One contact of a tube, 14 swings of its twentieth mode, against fewer and tighter nodes."""
+    system, omega = tube(40), 2.0 * np.pi * TUBE_HZ
+    few, many = FlowMap(system, FlowOptions(1e-12, nodes=14)), FlowMap(system)
+    assert many.tables.nodes.size > 2 * few.tables.nodes.size
+    start = np.zeros((1, 80))
+    start[0, 40] = 0.5
+    states, phases = many.to_state(start), np.array([0.0, 0.2])
+    expected, found = few.shoot(states, phases, omega), many.shoot(states, phases, omega)
+    assert expected.closings.sum() > 0
+    for a, b in ((found.ends, expected.ends), (found.monodromy, expected.monodromy)):
+        assert np.linalg.norm(a - b) < 1e-9 * np.linalg.norm(b)
 
 
 @pytest.mark.parametrize(
