@@ -304,7 +304,7 @@ def mass_block(
     On the plane of symmetry of a half model it is half of the cube that the whole model has.
     """
     model = drawing.component.model
-    normal = symmetry_normal(model, lump.point)
+    normal = symmetry_normal(drawing.component, lump.point)
     edge = ((lump.mass if normal is None else 2.0 * lump.mass) / BLOCK_DENSITY) ** (1 / 3)
     centre = model.mesh.points[node] + np.asarray(lump.offset)
     if side is None:

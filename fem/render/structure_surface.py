@@ -350,7 +350,7 @@ def sharp_edges(facets: dict[str, IntArray], points: FloatArray) -> IntArray:
 def symmetry_plane(component: Component, name: str) -> tuple[FloatArray, FloatArray]:
     """Point (3,) and unit normal (3,) of the plane of symmetry that the supports make somewhere."""
     model = component.model
-    normal = symmetry_normal(model, name)
+    normal = symmetry_normal(component, name)
     if normal is None:
         told = "('x', 'rotation') or ('y', 'rotation')" if model.plane else "what fem.symmetry does"
         raise ModelError(
@@ -360,9 +360,14 @@ def symmetry_plane(component: Component, name: str) -> tuple[FloatArray, FloatAr
     return model.mesh.points[model.mesh.nodes(name)[0]], normal
 
 
-def symmetry_normal(model: StructureModel, name: str) -> FloatArray | None:
-    """Unit normal (3,) of the plane of symmetry that the supports at a name make, if they do."""
+def symmetry_normal(component: Component, name: str) -> FloatArray | None:
+    """Unit normal (3,) of the plane of symmetry that the supports at a name make, if they do.
+
+    They hold what `fem.symmetry` does and no more; nodes that do not turn need no hold of it.
+    """
+    model = component.model
     nodes = model.mesh.nodes(name)
+    turning = (component.numbering.rotation[nodes] >= 0).any()
     held = {
         AXES[axis_index(direction)]
         for support in model.attached.supports
@@ -371,7 +376,8 @@ def symmetry_normal(model: StructureModel, name: str) -> FloatArray | None:
     }
     for index, axis in enumerate("xy" if model.plane else "xyz"):
         mirrored = {axis, *(f"rotation_{other}" for other in "xyz" if other != axis)}
-        if held == (mirrored.intersection(IN_PLANE) if model.plane else mirrored):
+        known = mirrored.intersection(IN_PLANE) if model.plane else mirrored
+        if (known if turning else {axis}) <= held <= known:
             return np.asarray(np.eye(3)[index])
     return None
 

@@ -229,12 +229,13 @@ def _check_mirror(scene: Scene, name: str, file: Path) -> None:
         if s.at == name
         for d in s.fixed
     }
-    turns = {axis: {f"rotation_{other}" for other in "xyz" if other != axis} for axis in "xyz"}
-    told = "one of 'x', 'y' and 'z' and the rotations about the other two"
+    planes = [{axis, *(f"rotation_{other}" for other in "xyz" if other != axis)} for axis in "xyz"]
+    planes += [{"x"}, {"y"}, {"z"}]  # of solids, whose nodes do not turn
+    told = "one of 'x', 'y' and 'z' and, but for solids, the rotations about the other two"
     if scene.mesh.model == "frame":
-        turns = {"x": {"rotation_z"}, "y": {"rotation_z"}}
+        planes = [{"x", "rotation_z"}, {"y", "rotation_z"}]
         told = "['x', 'rotation'] or ['y', 'rotation']"
-    if not any(held == {axis, *about} for axis, about in turns.items()):
+    if held not in planes:
         fault = f"'{name}' is not on a plane of symmetry, where [[supports]] fix {told} and no more"
         raise scene_error(file, ("mesh", "mirror"), fault)
 

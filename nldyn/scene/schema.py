@@ -124,14 +124,14 @@ class PartTable(Table):
 
     _made: Any = PrivateAttr(None)
     kind: Literal["beam", "truss", "solid", "shell"] = "beam"
-    """`"beam"`, `"truss"`, or in a structure `"solid"` or `"shell"`."""
+    """`"beam"`, `"truss"`, `"solid"`, or in space `"shell"`."""
     youngs_modulus: Positive
     """[N/m²] Young's modulus."""
     density: Positive
     """[kg/m³] Density."""
     poissons_ratio: Annotated[float, Field(gt=-1, lt=0.5)] | None = None
-    """Poisson's ratio, above -1 and below 0.5. Solids, shells, Timoshenko beams and beams of a
-    structure need it."""
+    """Poisson's ratio, above -1 and below 0.5. Solids, shells, Timoshenko beams and beams in
+    space need it."""
     plane: Literal["stress", "strain"] | None = None
     """Of a solid of triangles or quadrilaterals: `"stress"` or `"strain"`."""
     thickness: Positive | None = None
@@ -179,11 +179,11 @@ class PartTable(Table):
     axial_force: Number | None = None
     """[N] Preload of a beam, positive for tension."""
     orientation: Triple | None = None
-    """In a structure: direction (x, y, z) of the section's height. If left out, the height lies
-    in planes z = constant; along z, all but round bars need it."""
+    """Direction (x, y, z) of the section's height. If left out, the height lies in planes
+    z = constant; along z, all but round bars need it."""
     offset: Number | Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
-    """[m] In a structure: place of the beam's axis (along the height, along the width) as seen
-    from the line of the mesh. Of a shell one number: place of its middle surface along the
+    """[m] Place of the beam's axis (along the height, along the width) as seen from the line of
+    the mesh. Of a shell one number: place of its middle surface along the
     normal as seen from the nodes, about which they run anticlockwise."""
 
     @field_validator("offset", mode="before")
@@ -287,7 +287,7 @@ class PointMassTable(Table):
     """[kg m²] Moment of inertia about the centre of mass: about the normal of the plane; in a
     structure about all axes, or a list of three, about x, y and z."""
     offset: Triple | None = None
-    """[m] In a structure: place (x, y, z) of the centre of mass as seen from the point."""
+    """[m] Place (x, y, z) of the centre of mass as seen from the point."""
 
     @field_validator("rotary_inertia", mode="before")
     @classmethod
@@ -696,8 +696,8 @@ class ContactAreaTable(Table):
     """[m] Place [x, y, z] of the mesh where the gap is `gap`; the middle of the points unless
     given."""
     against: str | Annotated[list[str], Field(min_length=1)] | None = None
-    """What moves on the other side: beams of the same mesh, in a structure nodes that lie opposite
-    to nodes, or a list of interfaces; the ground unless given."""
+    """What moves on the other side: beams of the same mesh, nodes that lie opposite to nodes, or a
+    list of interfaces; the ground unless given."""
     dissipation: NotNegative = 0.0
     """[s/m] Loss of the contact (Hunt and Crossley): it grows with the penetration, 0 or more."""
     dashpot: NotNegative = 0.0

@@ -132,3 +132,29 @@ def test_what_makes_no_area_is_refused_in_a_sentence():
         arm.with_interfaces({"tip": arm.interfaces["tip"]})
     with pytest.raises(fem.ModelError, match="must have"):
         arm.with_interfaces({"other": np.ones(3)})
+
+
+@pytest.mark.parametrize("plane", [True, False])
+def test_points_opposite_on_other_beams_move_as_their_axis_does(plane):
+    """The other cantilever is of two parts whose lines end elsewhere; it is pulled at its tip."""
+    places = {"a": (0, 0), "b": (2, 0), "c": (0, 0.1), "m": (0.7, 0.1), "d": (2, 0.1)}
+    members = [("low", "a", "b", 4), ("far", "m", "d", 3), ("near", "c", "m", 2)]
+    mesh = fem.frame_mesh(places, members)
+    high = np.union1d(mesh.nodes("far"), mesh.nodes("near"))
+    turns = ("rotation",) if plane else ("z", *(f"rotation_{axis}" for axis in "xyz"))
+    pair = fem.assemble(
+        fem.StructureModel(
+            mesh.with_point_sets({"high": high}),
+            {name: BEAM for name in ("low", "far", "near")},
+            supports=[fem.Support(end, ("x", "y", *turns)) for end in ("a", "c")],
+            interfaces={"tip": fem.Interface("d", "y")},
+            plane=plane,
+        )
+    )
+    low = fem.contact_points(pair, "low", "y", points=3)
+    found = fem.opposite_points(pair, low, "high")
+    x, stiffness = low.places[:, 0], 2e11 * 0.02 * 0.01**3 / 12.0
+    assert np.allclose(found.places, low.places + np.array([0.0, 0.1, 0.0]), atol=1e-12)
+    u = spsolve(pair.stiffness, pair.interfaces["tip"])
+    assert np.allclose(found.vectors() @ u, x**2 * (6.0 - x) / (6.0 * stiffness), rtol=1e-9)
+    assert not (low.vectors() @ u).any()

@@ -132,13 +132,14 @@ def test_a_twisted_beam_turns_its_section():
     np.testing.assert_allclose(moved[tip] - rest[tip], turn, atol=2e-6)
 
 
-def test_a_mirror_makes_a_whole_of_half_a_block():
+@pytest.mark.parametrize("held", [fem.symmetry("x0", "x"), fem.Support("x0", "x")])
+def test_a_mirror_makes_a_whole_of_half_a_block(held):
     """The cut through the middle is not drawn: the surface of the whole is one sphere."""
     half = fem.assemble(
         fem.StructureModel(
             fem.box_mesh("bar", (1.0, 0.1, 0.1), (3, 1, 1)),
             {"bar": fem.SolidPart(fem.Material(2e11, 7800.0, 0.3))},
-            supports=[fem.symmetry("x0", "x")],
+            supports=[held],
         )
     )
     whole = structure_surface(half, mirror="x0")
