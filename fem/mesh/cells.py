@@ -202,9 +202,13 @@ class CellKind:
     @cached_property
     def quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Places (q, d) and weights (q,) in the reference cell."""
+        return self.rule(self.integration_order)
+
+    def rule(self, order: int) -> tuple[FloatArray, FloatArray]:
+        """Places (q, d) and weights (q,) that integrate polynomials of an order exactly."""
         if isinstance(self.element, NodalElement):
-            return self.element.rule(self.integration_order)
-        places, weights = get_quadrature(self.element, self.integration_order)
+            return self.element.rule(order)
+        places, weights = get_quadrature(self.element, order)
         return np.ascontiguousarray(places.T), weights
 
     @property
@@ -215,8 +219,7 @@ class CellKind:
     @cached_property
     def reduced_quadrature(self) -> tuple[FloatArray, FloatArray]:
         """Gauss's 2 places in each direction (q, d) and their weights (q,)."""
-        places, weights = get_quadrature(self.element, 3)
-        return np.ascontiguousarray(places.T), weights
+        return self.rule(3)
 
     def basis(self, places: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Shape functions and their reference gradients, (q, b) and (q, b, d), at places (q, d)."""

@@ -1,0 +1,202 @@
+"""Energy that solids have too much of in given shapes, by smoothing their stresses.
+
+The strains of a mesh are fitted by polynomials in each patch (`patches.py`); what they are off from
+these is the error of the mesh [1]_. Cells that lock have strains that go up and down from cell to
+cell, which no smooth field has.
+
+.. [1] O. C. Zienkiewicz and J. Z. Zhu, The superconvergent patch recovery and a posteriori error
+   estimates, International Journal for Numerical Methods in Engineering 33 (1992) 1331-1382.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from fem.assembly.patches import Patches, fitted, patches_of
+from fem.assembly.solids import unseen_rows
+from fem.base.arrays import FloatArray, IntArray
+from fem.elements.solids import gradients_and_volumes
+from fem.mesh.cells import KINDS, CellKind
+from fem.mesh.structure_mesh import StructureMesh
+from fem.model.structure import SolidCells
+
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+RIDGE = {1: np.array([1e-9] + [1e-8] * 3 + [1e-4] * 2), 2: np.array([1e-9] + [1e-8] * 3 + [1e-4] * 9)}
+"""For `fitted`, by the order of cells: slopes are asked for before what is of higher order."""
+SURE = 4
+"""Power of how well determined the fit of a patch is, with which it counts beside its neighbours."""
+BATCH_BYTES = 5e7
+
+
+def solid_errors(
+    mesh: StructureMesh, pieces: Sequence[SolidCells], shapes: FloatArray
+) -> FloatArray:
+    """Twice the energy (m,) in J of what the strains of a part are off, in shapes (m, n, 6)."""
+    order = max(piece.kind.order for piece in pieces)
+    corners = [piece.nodes[:, : len(piece.kind.corners)] for piece in pieces]
+    thin = [_thinness(mesh.points[block], pieces[0].kind.dimension) for block in corners]
+    patches = patches_of(mesh.points, corners, [piece.nodes for piece in pieces], thin)
+    size = len(RIDGE[order])
+    normal = np.zeros((len(patches.size), size, size))
+    right = np.zeros((len(patches.size), size, len(shapes) * len(PAIRS)))
+    count = np.zeros(len(patches.size))
+    for piece in pieces:
+        for nodes, places, weights, strain in _at_best(piece, mesh, shapes):
+            for column in nodes[:, : len(piece.kind.corners)].T:
+                terms, turned = _seen_from(patches, column, places, strain, order)
+                weighted = (terms * weights[..., None]).swapaxes(1, 2)
+                normal += patches.sums(column, weighted @ terms)
+                right += patches.sums(column, weighted @ turned)
+                count += patches.sums(column, np.ones(len(column)))
+    fits, known = fitted(normal, right, RIDGE[order])
+    found = np.zeros(len(shapes))
+    for piece in pieces:
+        found += _off(piece, mesh, shapes, patches, fits, count * known**SURE)
+    return found
+
+
+def _thinness(places: FloatArray, dimension: int) -> FloatArray:
+    """Inverse of how the corners (e, c, 3) of cells spread, (e, 3, 3); in the plane that along z."""
+    if dimension == 2:
+        return np.broadcast_to(np.diag([1.0, 1.0, 1.5]), (len(places), 3, 3))
+    away = places - places.mean(axis=1, keepdims=True)
+    return np.asarray(np.linalg.inv(away.swapaxes(1, 2) @ away / places.shape[1]))
+
+
+def polynomials(at: FloatArray, order: int) -> FloatArray:
+    """Terms (..., t) at x, y and height (..., 3): what bending of a part has, of the order of cells.
+
+    Examples
+    --------
+    >>> polynomials(np.array([2.0, 3.0, 5.0]), 1)
+    array([ 1.,  2.,  3.,  5., 10., 15.])
+    """
+    x, y, z = np.moveaxis(at, -1, 0)
+    terms = [np.ones_like(x), x, y, z, x * z, y * z]
+    if order == 2:
+        terms += [x * x, x * y, y * y, z * z, x * x * z, x * y * z, y * y * z]
+    return np.stack(terms, axis=-1)
+
+
+def _seen_from(
+    patches: Patches, corners: IntArray, places: FloatArray, strain: FloatArray, order: int
+) -> tuple[FloatArray, FloatArray]:
+    """Terms (e, q, t) and strains (e, q, 6 m) in the axes of the patches around corners (e,)."""
+    at, axes = patches.coordinates(corners, places)
+    turned = axes @ strain @ axes.swapaxes(-1, -2)
+    parts = np.stack([turned[..., i, j] for i, j in PAIRS], axis=-1)
+    return polynomials(at, order), np.moveaxis(parts, 0, 2).reshape(*at.shape[:2], -1)
+
+
+def _batches(piece: SolidCells, shapes: FloatArray) -> Iterator[slice]:
+    points = len(piece.kind.quadrature[1])
+    step = max(int(BATCH_BYTES / (8 * points * (3 * piece.kind.node_count + 20 * len(shapes)))), 1)
+    for first in range(0, len(piece.nodes), step):
+        yield slice(first, first + step)
+
+
+def best_places(kind: CellKind) -> tuple[FloatArray, FloatArray]:
+    """Where strains of cells are the best, in the reference cell (q, d), and weights (q,)."""
+    if kind.order == 1:
+        return kind.quadrature
+    return kind.reduced_quadrature if len(kind.corners) == 2**kind.dimension else kind.rule(2)
+
+
+def _at_best(
+    piece: SolidCells, mesh: StructureMesh, shapes: FloatArray
+) -> Iterator[tuple[IntArray, FloatArray, FloatArray, FloatArray]]:
+    """Nodes, places (e, q, 3), shares of the volume (e, q) and strains (m, e, q, 3, 3), in batches."""
+    at, weights = best_places(piece.kind)
+    values, _ = piece.kind.basis(at)
+    for batch in _batches(piece, shapes):
+        nodes = piece.nodes[batch]
+        gradients, volumes = _gradients(piece.kind, mesh.points[nodes], at)
+        share = np.abs(volumes) * weights
+        share /= share.sum(axis=1, keepdims=True)
+        yield nodes, values @ mesh.points[nodes], share, _strains(gradients, shapes[:, nodes, :3])
+
+
+def _gradients(
+    kind: CellKind, coordinates: FloatArray, at: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Gradients (e, q, b, 3), zero along z in the plane, and the volumes of the mapping (e, q)."""
+    d = kind.dimension
+    gradients, volumes = gradients_and_volumes(kind, coordinates[..., :d], at)
+    return np.pad(gradients, ((0, 0), (0, 0), (0, 0), (0, 3 - d))), volumes
+
+
+def _strains(gradients: FloatArray, displacements: FloatArray) -> FloatArray:
+    """Strains (m, e, q, 3, 3) of displacements (m, e, b, 3)."""
+    slope = np.swapaxes(displacements, -1, -2)[:, :, None] @ gradients
+    return np.asarray((slope + slope.swapaxes(-1, -2)) / 2.0)
+
+
+def _off(
+    piece: SolidCells,
+    mesh: StructureMesh,
+    shapes: FloatArray,
+    patches: Patches,
+    fits: FloatArray,
+    trust: FloatArray,
+) -> FloatArray:
+    """Twice the energy (m,) of the differences of a piece's own strains and the smooth ones."""
+    kind, order = piece.kind, 1 if fits.shape[1] == len(RIDGE[1]) else 2
+    at, weights = kind.quadrature
+    own_at = kind.reduced_quadrature[0] if piece.reduced else at
+    between = _linear(kind, at) @ np.linalg.inv(_linear(kind, own_at)) if piece.reduced else None
+    shares, first, mu = _linear(kind, at), *piece.part.lame
+    found = np.zeros(len(shapes))
+    for batch in _batches(piece, shapes):
+        nodes = piece.nodes[batch]
+        gradients, _ = _gradients(kind, mesh.points[nodes], own_at)
+        off = -_strains(gradients, shapes[:, nodes, :3])
+        if between is not None:
+            off = np.einsum("pq,meqij->mepij", between, off)
+        off += _smooth(nodes[:, : len(kind.corners)], kind.basis(at)[0] @ mesh.points[nodes],
+                       shares, patches, fits, trust, order)
+        volume = np.abs(_gradients(kind, mesh.points[nodes], at)[1]) * weights
+        volume *= piece.part.thickness or 1.0
+        density = first * np.trace(off, axis1=-2, axis2=-1) ** 2
+        density += 2.0 * mu * np.sum(off**2, axis=(-1, -2))
+        found += np.einsum("eq,meq->m", volume, density)
+        if piece.reduced:
+            rows, stiffness = unseen_rows(piece, mesh, batch)
+            unseen = np.einsum("erbi,mebi->mer", rows, shapes[:, nodes, : kind.dimension])
+            found += np.einsum("er,mer->m", stiffness, unseen**2)
+    return found
+
+
+def _linear(kind: CellKind, at: FloatArray) -> FloatArray:
+    """Linear functions (q, c) of the corners of cells of a kind."""
+    names = {(2, 3): "triangle", (2, 4): "quad", (3, 4): "tetra", (3, 5): "pyramid"}
+    names |= {(3, 6): "wedge", (3, 8): "hexahedron"}
+    return KINDS[names[kind.dimension, len(kind.corners)]].basis(at)[0]
+
+
+def _smooth(
+    corners: IntArray,
+    places: FloatArray,
+    shares: FloatArray,
+    patches: Patches,
+    fits: FloatArray,
+    trust: FloatArray,
+    order: int,
+) -> FloatArray:
+    """Smooth strains (m, e, q, 3, 3): the fits of the patches of all corners, by their shares."""
+    count = fits.shape[2] // len(PAIRS)
+    total = np.zeros((count, *places.shape[:2], 3, 3))
+    whole = np.zeros(places.shape[:2])
+    for column, share in zip(corners.T, shares.T, strict=True):
+        at, axes = patches.coordinates(column, places)
+        patch = patches.place[column]
+        parts = polynomials(at, order) @ fits[patch]
+        parts = np.moveaxis(parts.reshape(*at.shape[:2], count, len(PAIRS)), 2, 0)
+        tensor = np.empty((*parts.shape[:-1], 3, 3))
+        for number, (i, j) in enumerate(PAIRS):
+            tensor[..., i, j] = tensor[..., j, i] = parts[..., number]
+        weight = np.maximum(share * trust[patch][:, None], np.finfo(np.float64).tiny)
+        total += weight[..., None, None] * (axes.swapaxes(-1, -2) @ tensor @ axes)
+        whole += weight
+    return np.asarray(total / whole[..., None, None])
