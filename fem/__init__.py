@@ -1,6 +1,12 @@
 """Structures: from a mesh to stiffness, mass and interfaces."""
 
-from fem.assembly.component import Component, DistortionWarning, LockingWarning, assemble
+from fem.assembly.component import (
+    Component,
+    DistortionWarning,
+    LockingWarning,
+    MeshWarning,
+    assemble,
+)
 from fem.assembly.contact import ContactPoints, contact_points, opposite_points, unit_vector
 from fem.assembly.summary import MassProperties, mass_properties, summary
 from fem.base.errors import JointWarning, ModelError
@@ -64,6 +70,7 @@ __all__ = [
     "LockingWarning",
     "MassProperties",
     "Material",
+    "MeshWarning",
     "ModelError",
     "Pieces",
     "PlateSection",

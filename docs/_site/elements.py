@@ -16,6 +16,7 @@ sys.path[:0] = [str(ROOT / "tests" / "fem"), str(ROOT / "tests" / "fem" / "eleme
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402
+import mesh_errors  # noqa: E402
 import test_fem_macneal_harder as tested  # noqa: E402
 from macneal_harder import FIRST_ORDER, SHELLS, SOLIDS, problems  # noqa: E402
 
@@ -25,10 +26,12 @@ PICTURE = ROOT / "docs" / "images" / "element_tests.png"
 def write_tables() -> None:
     """Put what is computed between the marks of the page."""
     text = tested.DOC.read_text(encoding="utf-8")
-    for name, kinds in tested.TABLES.items():
+    tables = [(name, kinds, tested.rows) for name, kinds in tested.TABLES.items()]
+    tables += [(name, kinds, mesh_errors.rows) for name, kinds in mesh_errors.TABLES.items()]
+    for name, kinds, rows in tables:
         head = ["| problem |" + "".join(f" {kind} |" for kind in kinds)]
         head.append("| --- |" + " ---: |" * len(kinds))
-        lines = "\n".join([*head, *tested.rows(kinds)])
+        lines = "\n".join([*head, *rows(kinds)])
         first, last = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
         before, rest = text.split(first)
         text = f"{before}{first}{lines}\n{last}{rest.split(last)[1]}"

@@ -1,17 +1,18 @@
 """Patches: the cells around each corner of a mesh, in which stresses are smoothed.
 
-A patch has axes of its own, the third along the direction in which its cells are thinnest. Where
-that is clear the patch is taken for a piece of a thin part: its middle is z = q(x, y), of second
-order, heights count from it, and tensors are turned into its tangent plane, so that what is smooth
-along a curved part is a polynomial.
+Where cells are clearly thin in one direction a patch is taken for a piece of a thin part: its third
+axis is that direction, its middle is z = q(x, y), of second order, heights count from it, and
+tensors are turned into its tangent plane, so that what is smooth along a curved part is a
+polynomial. Other patches have the axes of the mesh.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 from scipy import sparse
 
 from fem.base.arrays import FloatArray, IntArray
@@ -33,6 +34,8 @@ class Patches:
         Which patch belongs to a node of the mesh, -1 where none, shape (n,).
     centres, axes, size
         Of each, in m, shape (p, 3), (p, 3, 3) by rows, and (p,).
+    thin
+        Whether each is a piece of a thin part, shape (p,).
     surface
         Coefficients of z over the size by those of 1, x, y, x², x y, y², shape (p, 6).
     height
@@ -43,6 +46,7 @@ class Patches:
     centres: FloatArray
     axes: FloatArray
     size: FloatArray
+    thin: npt.NDArray[np.bool_]
     surface: FloatArray
     height: FloatArray
 
@@ -112,8 +116,10 @@ def patches_of(
             away = points[block] - centres[place[column]][:, None]
             np.maximum.at(size, place[column], np.linalg.norm(away, axis=2).max(axis=1))
     none = np.zeros((len(used), 6))
-    flat = Patches(place, centres, vectors.swapaxes(1, 2).copy(), size, none, np.ones(len(used)))
-    return _with_surface(flat, points, corners, nodes, values[:, 2] > THIN * values[:, 1])
+    thin = values[:, 2] > THIN * values[:, 1]
+    axes = np.where(thin[:, None, None], vectors.swapaxes(1, 2), np.eye(3))
+    flat = Patches(place, centres, axes, size, thin, none, np.ones(len(used)))
+    return _with_surface(flat, points, corners, nodes)
 
 
 def _with_surface(
@@ -121,7 +127,6 @@ def _with_surface(
     points: FloatArray,
     corners: Sequence[IntArray],
     nodes: Sequence[IntArray],
-    thin: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
 ) -> Patches:
     """The patches with the middles of the thin ones, through all nodes, and their heights."""
     count = len(flat.size)
@@ -134,7 +139,7 @@ def _with_surface(
             right += flat.sums(column, np.einsum("ebt,eb->et", terms, at[..., 2]))
     ridge = np.diag([FLAT_RIDGE] * 3 + [CURVED_RIDGE] * 3)
     normal += np.trace(normal, axis1=1, axis2=2)[:, None, None] * ridge
-    surface = np.linalg.solve(normal, right[..., None])[..., 0] * thin[:, None]
+    surface = np.linalg.solve(normal, right[..., None])[..., 0] * flat.thin[:, None]
     height = np.zeros(count)
     for block, own in zip(nodes, corners, strict=True):
         for column in own.T:
@@ -144,7 +149,7 @@ def _with_surface(
             )
             np.maximum.at(height, flat.place[column], np.abs(at[..., 2] - level).max(axis=1))
     height = np.maximum(height, np.finfo(np.float64).eps)
-    return Patches(flat.place, flat.centres, flat.axes, flat.size, surface, height)
+    return replace(flat, surface=surface, height=height)
 
 
 def quadratics(x: FloatArray, y: FloatArray) -> FloatArray:

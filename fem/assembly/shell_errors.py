@@ -61,7 +61,7 @@ def shell_errors(
     blocks: Sequence[tuple[CellKind, IntArray, FloatArray]],
     shapes: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Twice the energy in J that is too much, and mass in kg times m² that is too little, (m,) each.
+    """Twice the energy in J that is too much, and the kg m² that are too little, (m,) each.
 
     Parameters
     ----------
@@ -80,9 +80,7 @@ def shell_errors(
     thin = [normal[:, :, None] * normal[:, None] for normal in normals]
     patches = patches_of(points, nodes, nodes, thin)
     fits, trust = _fits(points, patches, facets)
-    law = np.append(
-        _split_law(part), [part.shearing, part.shearing]
-    )
+    law = np.append(_split_law(part), [part.shearing, part.shearing])
     energy, mass = np.zeros(len(shapes)), np.zeros(len(shapes))
     for each in facets:
         off = _smooth(points, patches, each, fits, trust) - each.own
@@ -93,9 +91,7 @@ def shell_errors(
             energy -= _energy(each, law, more, 2.0 * each.own + more)
         bent = each.own[..., :3].mean(axis=2)
         lift = np.einsum("eqs,mes->meq", parabola, bent * [0.5, 0.5, 0.5])
-        mass += part.mass * np.einsum(
-            "eq,meq->m", each.area, lift * (2.0 * each.deflection + lift)
-        )
+        mass += part.mass * np.einsum("eq,meq->m", each.area, lift * (2.0 * each.deflection + lift))
     return energy, mass
 
 
@@ -139,7 +135,11 @@ def _facets(
         mean = np.einsum("eq,meqr->mer", area, own) / area.sum(axis=1)[:, None]
         own = np.broadcast_to(mean[:, :, None], own.shape)
     own = np.stack(
-        [(own[..., 0] + own[..., 1]) / 2, (own[..., 0] - own[..., 1]) / 2, *np.moveaxis(own, -1, 0)[2:]],
+        [
+            (own[..., 0] + own[..., 1]) / 2,
+            (own[..., 0] - own[..., 1]) / 2,
+            *np.moveaxis(own, -1, 0)[2:],
+        ],
         axis=-1,
     )
     values, _ = kind.basis(places)
@@ -150,7 +150,7 @@ def _facets(
 def _turns(
     patches: Patches, facets: Facets, column: int, places: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Terms (e, q, 3), turns (e, 2, 2) from the facets' plane to that of patches, and sides (e,)."""
+    """Terms (e, q, 3), turns (e, 2, 2) from the facets' planes to patches, and sides (e,)."""
     corners = facets.nodes[:, column]
     at, _ = patches.coordinates(corners, places)
     middle = facets.cells
@@ -167,6 +167,8 @@ def turned(strains: FloatArray, turn: FloatArray, side: FloatArray) -> FloatArra
 
     Parameters
     ----------
+    strains
+        In the old axes.
     turn
         New components of vectors from old ones, shape (e, 2, 2).
     side
@@ -226,14 +228,14 @@ def _between(facets: Facets) -> FloatArray:
     at = facets.cells.plane
     there = values @ at
     products = [(0, 0), (1, 1), (0, 1)]
-    found = [(at[..., i] * at[..., j]) @ values.T - there[..., i] * there[..., j] for i, j in products]
+    found = [
+        (at[..., i] * at[..., j]) @ values.T - there[..., i] * there[..., j] for i, j in products
+    ]
     return np.stack(found, axis=-1)
 
 
-def _across(
-    patches: Patches, facets: Facets, fits: FloatArray, parabola: FloatArray
-) -> FloatArray:
-    """Curvatures and no shears (m, e, q, 5) that quadrilaterals lack, being linear where they bend."""
+def _across(patches: Patches, facets: Facets, fits: FloatArray, parabola: FloatArray) -> FloatArray:
+    """Curvatures and no shears (m, e, q, 5) that quadrilaterals lack where they bend."""
     middle = MIDDLE[facets.kind.name]
     slope = facets.kind.basis(middle)[1][0]
     gradient = slope @ np.linalg.inv(jacobians(facets.kind, facets.cells.plane, middle)[:, 0])

@@ -23,10 +23,15 @@ from fem.mesh.structure_mesh import StructureMesh
 from fem.model.structure import SolidCells
 
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
-RIDGE = {1: np.array([1e-9] + [1e-8] * 3 + [1e-4] * 2), 2: np.array([1e-9] + [1e-8] * 3 + [1e-4] * 9)}
+TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+"""How often each is in a symmetric tensor."""
+RIDGE = {
+    1: np.array([1e-9] + [1e-8] * 3 + [1e-4] * 2),
+    2: np.array([1e-9] + [1e-8] * 3 + [1e-4] * 9),
+}
 """For `fitted`, by the order of cells: slopes are asked for before what is of higher order."""
 SURE = 4
-"""Power of how well determined the fit of a patch is, with which it counts beside its neighbours."""
+"""Power of how well determined the fit of a patch is: its weight beside its neighbours'."""
 BATCH_BYTES = 5e7
 
 
@@ -58,15 +63,15 @@ def solid_errors(
 
 
 def _thinness(places: FloatArray, dimension: int) -> FloatArray:
-    """Inverse of how the corners (e, c, 3) of cells spread, (e, 3, 3); in the plane that along z."""
+    """Inverse of how the corners (e, c, 3) of cells spread, (e, 3, 3); none in the plane."""
     if dimension == 2:
-        return np.broadcast_to(np.diag([1.0, 1.0, 1.5]), (len(places), 3, 3))
+        return np.broadcast_to(np.eye(3), (len(places), 3, 3))
     away = places - places.mean(axis=1, keepdims=True)
     return np.asarray(np.linalg.inv(away.swapaxes(1, 2) @ away / places.shape[1]))
 
 
 def polynomials(at: FloatArray, order: int) -> FloatArray:
-    """Terms (..., t) at x, y and height (..., 3): what bending of a part has, of the order of cells.
+    """Terms (..., t) at x, y and height (..., 3): of bending, by the order of cells.
 
     Examples
     --------
@@ -80,14 +85,33 @@ def polynomials(at: FloatArray, order: int) -> FloatArray:
     return np.stack(terms, axis=-1)
 
 
+def turning(axes: FloatArray) -> FloatArray:
+    """Matrices (..., 6, 6) of the components `PAIRS` of tensors in axes (..., 3, 3) by rows.
+
+    Examples
+    --------
+    >>> turned = turning(np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
+    >>> turned @ np.array([1.0, 2.0, 3.0, 0.5, 0.0, 0.0])
+    array([ 2. ,  1. ,  3. , -0.5,  0. ,  0. ])
+    """
+    found = np.empty((*axes.shape[:-2], len(PAIRS), len(PAIRS)))
+    for row, (i, j) in enumerate(PAIRS):
+        for column, (m, n) in enumerate(PAIRS):
+            found[..., row, column] = axes[..., i, m] * axes[..., j, n]
+            if m != n:
+                found[..., row, column] += axes[..., i, n] * axes[..., j, m]
+    return found
+
+
 def _seen_from(
     patches: Patches, corners: IntArray, places: FloatArray, strain: FloatArray, order: int
 ) -> tuple[FloatArray, FloatArray]:
     """Terms (e, q, t) and strains (e, q, 6 m) in the axes of the patches around corners (e,)."""
     at, axes = patches.coordinates(corners, places)
-    turned = axes @ strain @ axes.swapaxes(-1, -2)
-    parts = np.stack([turned[..., i, j] for i, j in PAIRS], axis=-1)
-    return polynomials(at, order), np.moveaxis(parts, 0, 2).reshape(*at.shape[:2], -1)
+    thin = patches.thin[patches.place[corners]]
+    turned = strain.copy()
+    turned[thin] = turning(axes[thin]) @ strain[thin]
+    return polynomials(at, order), turned.reshape(*at.shape[:2], -1)
 
 
 def _batches(piece: SolidCells, shapes: FloatArray) -> Iterator[slice]:
@@ -107,7 +131,7 @@ def best_places(kind: CellKind) -> tuple[FloatArray, FloatArray]:
 def _at_best(
     piece: SolidCells, mesh: StructureMesh, shapes: FloatArray
 ) -> Iterator[tuple[IntArray, FloatArray, FloatArray, FloatArray]]:
-    """Nodes, places (e, q, 3), shares of the volume (e, q) and strains (m, e, q, 3, 3), in batches."""
+    """Nodes, places (e, q, 3), shares of the volume (e, q) and strains (e, q, 6, m), in batches."""
     at, weights = best_places(piece.kind)
     values, _ = piece.kind.basis(at)
     for batch in _batches(piece, shapes):
@@ -128,9 +152,12 @@ def _gradients(
 
 
 def _strains(gradients: FloatArray, displacements: FloatArray) -> FloatArray:
-    """Strains (m, e, q, 3, 3) of displacements (m, e, b, 3)."""
-    slope = np.swapaxes(displacements, -1, -2)[:, :, None] @ gradients
-    return np.asarray((slope + slope.swapaxes(-1, -2)) / 2.0)
+    """Components `PAIRS` of strains (e, q, 6, m) of displacements (m, e, b, 3)."""
+    e, q, b, _ = gradients.shape
+    moved = np.moveaxis(displacements, 0, -1).reshape(e, b, -1)
+    slope = gradients.swapaxes(2, 3).reshape(e, 3 * q, b) @ moved
+    slope = slope.reshape(e, q, 3, 3, -1)
+    return np.stack([(slope[:, :, i, j] + slope[:, :, j, i]) / 2.0 for i, j in PAIRS], axis=2)
 
 
 def _off(
@@ -153,14 +180,21 @@ def _off(
         gradients, _ = _gradients(kind, mesh.points[nodes], own_at)
         off = -_strains(gradients, shapes[:, nodes, :3])
         if between is not None:
-            off = np.einsum("pq,meqij->mepij", between, off)
-        off += _smooth(nodes[:, : len(kind.corners)], kind.basis(at)[0] @ mesh.points[nodes],
-                       shares, patches, fits, trust, order)
+            off = np.einsum("pq,eqrm->eprm", between, off, optimize=True)
+        off += _smooth(
+            nodes[:, : len(kind.corners)],
+            kind.basis(at)[0] @ mesh.points[nodes],
+            shares,
+            patches,
+            fits,
+            trust,
+            order,
+        )
         volume = np.abs(_gradients(kind, mesh.points[nodes], at)[1]) * weights
         volume *= piece.part.thickness or 1.0
-        density = first * np.trace(off, axis1=-2, axis2=-1) ** 2
-        density += 2.0 * mu * np.sum(off**2, axis=(-1, -2))
-        found += np.einsum("eq,meq->m", volume, density)
+        density = first * off[:, :, :3].sum(axis=2) ** 2
+        density += 2.0 * mu * np.einsum("r,eqrm->eqm", TWICE, off**2)
+        found += np.einsum("eq,eqm->m", volume, density)
         if piece.reduced:
             rows, stiffness = unseen_rows(piece, mesh, batch)
             unseen = np.einsum("erbi,mebi->mer", rows, shapes[:, nodes, : kind.dimension])
@@ -184,19 +218,17 @@ def _smooth(
     trust: FloatArray,
     order: int,
 ) -> FloatArray:
-    """Smooth strains (m, e, q, 3, 3): the fits of the patches of all corners, by their shares."""
-    count = fits.shape[2] // len(PAIRS)
-    total = np.zeros((count, *places.shape[:2], 3, 3))
+    """Smooth strains (e, q, 6, m): the fits of the patches of all corners, by their shares."""
+    total = np.zeros((*places.shape[:2], len(PAIRS), fits.shape[2] // len(PAIRS)))
     whole = np.zeros(places.shape[:2])
     for column, share in zip(corners.T, shares.T, strict=True):
         at, axes = patches.coordinates(column, places)
         patch = patches.place[column]
-        parts = polynomials(at, order) @ fits[patch]
-        parts = np.moveaxis(parts.reshape(*at.shape[:2], count, len(PAIRS)), 2, 0)
-        tensor = np.empty((*parts.shape[:-1], 3, 3))
-        for number, (i, j) in enumerate(PAIRS):
-            tensor[..., i, j] = tensor[..., j, i] = parts[..., number]
         weight = np.maximum(share * trust[patch][:, None], np.finfo(np.float64).tiny)
-        total += weight[..., None, None] * (axes.swapaxes(-1, -2) @ tensor @ axes)
+        seen = (polynomials(at, order) * weight[..., None]) @ fits[patch]
+        seen = seen.reshape(total.shape)
+        thin = patches.thin[patch]
+        seen[thin] = turning(axes[thin].swapaxes(-1, -2)) @ seen[thin]
+        total += seen
         whole += weight
     return np.asarray(total / whole[..., None, None])

@@ -16,6 +16,7 @@ import cms
 import fem
 from cms.reduction.doubt import check_unreduced
 from cms.reduction.seen import told_of_seen
+from fem.assembly.component import MOST_ERROR
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LARGEST_DENSE, ConvergenceError, SystemModelError
 from nldyn.reduction.candidates import Candidates, candidate_modes
@@ -41,6 +42,10 @@ if TYPE_CHECKING:
 Given = TypeVar("Given")
 AnyComponent = fem.Component | cms.Matrices
 logger = logging.getLogger("nldyn")
+ESTIMATED = 4  # lowest elastic modes whose error by the mesh is estimated
+TOLD_ERROR = (
+    0.025  # of a frequency: above it the true one is over 2 %, see docs/results/elements.md
+)
 LARGE = 20000  # degrees of freedom from which on the factorisation takes seconds
 
 
@@ -90,7 +95,31 @@ def build_structure(scene: Scene, progress: Progress | None = None) -> Structure
     if scene.reduction is None:
         return Structure()
     component = build_any(scene)
-    return Structure(component, build_reduced(scene, component, progress))
+    reduced = build_reduced(scene, component, progress)
+    if isinstance(component, fem.Component):
+        tell_mesh_errors(component, reduced)
+    return Structure(component, reduced)
+
+
+def tell_mesh_errors(component: fem.Component, reduced: cms.ReducedModel) -> None:
+    """Warn of the mesh where it makes some of the lowest modes' frequencies likely too high."""
+    elastic = np.flatnonzero(reduced.frequencies_hz > 0.0)
+    at = elastic[elastic < len(reduced.frequencies_hz) - reduced.residual_modes][:ESTIMATED]
+    if not len(at):
+        return
+    errors = component.mesh_errors(reduced.expand(np.eye(len(reduced.frequencies_hz))[:, at]))
+    told = [
+        f"mode {mode + 1} ({frequency:.4g} Hz) by "
+        + (f"{100.0 * error:.2g} %" if error < MOST_ERROR else "100 % or more")
+        for mode, frequency, error in zip(at, reduced.frequencies_hz[at], errors, strict=True)
+        if error > TOLD_ERROR
+    ]
+    if told:
+        text = (
+            f"{component.model.mesh.source}: the mesh makes frequencies too high: likely"
+            f" {', '.join(told)}; take shorter cells, or cells of second order"
+        )
+        warnings.warn(text, fem.MeshWarning, stacklevel=3)
 
 
 def build_reduced(

@@ -1,0 +1,60 @@
+"""What the modes of a mesh say of its errors, against finer meshes."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mesh_errors import TABLES, counts, errors, plate, ring, rows
+
+from nldyn.scene.build import TOLD_ERROR
+
+DOC = Path(__file__).resolve().parents[3] / "docs" / "results" / "elements.md"
+COARSE = [
+    *(
+        (plate, kind, 4, 0.01, "clamped")
+        for kind in ("quad", "triangle", "hexahedron20", "tetra10")
+    ),
+    *((ring, kind, 16, 0.1, "free") for kind in ("quad", "tetra10", "wedge15", "hexahedron")),
+]
+FINE = [
+    *((plate, kind, 12, 0.01, "supported") for kind in ("quad", "triangle", "hexahedron20")),
+    *((ring, kind, 32, 0.1, "free") for kind in ("hexahedron20", "tetra10", "wedge15")),
+]
+
+
+@pytest.mark.parametrize(("make", "kind", "n", "thickness", "held"), COARSE)
+def test_a_coarse_mesh_is_told(make, kind, n, thickness, held):
+    true, said = errors(make, kind, n, thickness, held)
+    assert true > 0.05 and said > TOLD_ERROR
+    assert said > true / 5.0
+
+
+@pytest.mark.parametrize(("make", "kind", "n", "thickness", "held"), FINE)
+def test_a_fine_mesh_is_not_told(make, kind, n, thickness, held):
+    true, said = errors(make, kind, n, thickness, held)
+    assert true < 0.02 and said < TOLD_ERROR
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TABLES)
+def test_the_table_of_errors_is_what_is_computed(name):
+    text = DOC.read_text(encoding="utf-8")
+    table = re.search(rf"<!-- {name} -->\n(.*?)<!-- end of {name} -->", text, re.DOTALL)[1]
+    lines = table.strip().splitlines()[2:]
+    assert lines == list(rows(TABLES[name]))
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_no_mesh_of_the_tables_is_told_wrongly(name):
+    text = DOC.read_text(encoding="utf-8")
+    table = re.search(rf"<!-- {name} -->\n(.*?)<!-- end of {name} -->", text, re.DOTALL)[1]
+    found = counts(table.strip().splitlines()[2:])
+    assert found["misses"] == found["false alarms"] == 0
+    assert found["hits"] > 25
+
+
+def test_the_estimate_does_not_depend_on_the_scale_of_a_mode():
+    component = plate("hexahedron20", 4, 0.01, "clamped")
+    shape = np.random.default_rng(1).standard_normal((len(component.free), 1))
+    assert component.mesh_errors(-3.0 * shape) == pytest.approx(component.mesh_errors(shape))
