@@ -28,9 +28,9 @@ def part_errors(
         found[name] = solid_errors(model.mesh, solids, shapes), np.zeros(len(shapes))
     names = {id(part): name for name, (part, _) in model.shells.items()}
     facets: dict[int, tuple[ShellPart, list[tuple[CellKind, IntArray, FloatArray]]]] = {}
-    for part, *block in shell_pieces(model):
+    for part, kind, nodes, normals in shell_pieces(model):
         if part.section is None:
-            facets.setdefault(id(part), (part, []))[1].append((block[0], block[1], block[2]))
+            facets.setdefault(id(part), (part, []))[1].append((kind, nodes, normals))
     for key, (part, blocks) in facets.items():
         found[names[key]] = shell_errors(model.mesh.points, part, blocks, shapes)
     return found

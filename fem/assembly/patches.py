@@ -139,7 +139,8 @@ def _with_surface(
             right += flat.sums(column, np.einsum("ebt,eb->et", terms, at[..., 2]))
     ridge = np.diag([FLAT_RIDGE] * 3 + [CURVED_RIDGE] * 3)
     normal += np.trace(normal, axis1=1, axis2=2)[:, None, None] * ridge
-    surface = np.linalg.solve(normal, right[..., None])[..., 0] * flat.thin[:, None]
+    answer = np.linalg.solve(normal, right[..., None])[..., 0]
+    surface = np.asarray(answer * flat.thin[:, None], dtype=np.float64)
     height = np.zeros(count)
     for block, own in zip(nodes, corners, strict=True):
         for column in own.T:
@@ -190,7 +191,7 @@ def fitted(
 
 def _sums(at: IntArray, values: FloatArray, count: int) -> FloatArray:
     into = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))), shape=(count, len(at)))
-    found = into @ values.reshape(len(at), -1)
+    found = np.asarray(into @ values.reshape(len(at), -1))
     return np.asarray(found.reshape(count, *values.shape[1:]), dtype=np.float64)
 
 

@@ -1,13 +1,16 @@
 """What the modes of a mesh say of its errors, against finer meshes."""
 
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mesh_errors import TABLES, counts, errors, plate, ring, rows
 
-from nldyn.scene.build import TOLD_ERROR
+import cms
+import fem
+from nldyn.scene.build import TOLD_ERROR, tell_mesh_errors
 
 DOC = Path(__file__).resolve().parents[3] / "docs" / "results" / "elements.md"
 COARSE = [
@@ -58,3 +61,14 @@ def test_the_estimate_does_not_depend_on_the_scale_of_a_mode():
     component = plate("hexahedron20", 4, 0.01, "clamped")
     shape = np.random.default_rng(1).standard_normal((len(component.free), 1))
     assert component.mesh_errors(-3.0 * shape) == pytest.approx(component.mesh_errors(shape))
+
+
+def test_a_scene_tells_of_its_mesh_by_mode_and_amount():
+    component = plate("hexahedron20", 4, 0.01, "clamped")
+    with pytest.warns(fem.MeshWarning, match=r"mode 1 \(.* Hz\) by 2\d %") as caught:
+        tell_mesh_errors(component, cms.reduce(component, modes=2))
+    assert len(caught) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fine = plate("hexahedron20", 8, 0.01, "supported")
+        tell_mesh_errors(fine, cms.reduce(fine, modes=1))
