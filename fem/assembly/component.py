@@ -60,7 +60,8 @@ class LockingWarning(UserWarning):
 
     - hexahedra on flat plates that are loaded at a point (in full 0.37 to 0.82, reduced 0.84), and
       in full on clamped ones (0.85);
-    - tetrahedra of second order in a single row that is twisted (0.895);
+    - wedges, tetrahedra and pyramids of second order in one layer of a thin plate, of which the
+      modes tell (`Component.mesh_errors`), and tetrahedra in a single twisted row (0.895);
     - shells of triangles in a single row that is twisted (0.70 to 0.88), that are parallelograms
       bent in their plane (0.74), and much longer than wide below a force (0.75 to 0.86).
 
