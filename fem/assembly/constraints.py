@@ -148,6 +148,8 @@ class Constraints:
         """All degrees of freedom from the free ones, sparse (size, N)."""
         N = len(self.free)
         unit = sparse.csr_array((np.ones(N), (self.free, np.arange(N))), shape=(self.size, N))
+        if not len(self.dependent):
+            return unit
         spread = sparse.csr_array(
             (np.ones(len(self.dependent)), (self.dependent, np.arange(len(self.dependent)))),
             shape=(self.size, len(self.dependent)),
