@@ -13,6 +13,7 @@
 #include "resolution.c"
 #include "round_panel.c"
 #include "panel.c"
+#include "many.c"
 #include "panel_end.c"
 #include "guess.c"
 #include "events.c"

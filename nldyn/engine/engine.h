@@ -199,6 +199,7 @@ typedef struct {
     double *inverse;  /* (na m, na m) of 1 - slope G, at these slopes or earlier ones, see `invert` */
     int *order;       /* (na m,) scratch for it */
     bool kept;        /* whether it is worth keeping */
+    bool many;        /* whether the forces are found by iteration, without G and its inverse */
     double *inverted; /* (outputs, m) slopes for which it was filled, or nan in the first */
     int made_kind;    /* kind and length for which there, to, back and G were filled */
     double made_length;
@@ -223,6 +224,7 @@ typedef struct {
     double *viscosity, *off, *hold_matrix, *shift, *kick; /* hold_speeds */
     int *hold_order;
     double *forces, *part, *change;                    /* panel_columns */
+    double *pushed, *carried, *added, *part_many, *flown; /* panels of many stops */
     double *stop_forces, *pushes, *first_pushes, *held, *mobility; /* rigid stops */
     int *resting, *mobility_order;
     double *rate, *moved, *moved_shift, *along, *offsets;

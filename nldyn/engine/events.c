@@ -374,7 +374,7 @@ static Event first_event(const Motion *M, int kind, double phase, double h)
     const Flow *fl = M->fl;
     Event found = {-1, 2.0, 2.0};
     int position = -1;
-    if (M->panel->na < fl->n_stops) drive_back(fl, M->tab, kind, M->w, h, M->panel, M->s);
+    if (M->panel->na < fl->n_stops) drive_back(fl, M->tab, M->w, M->panel, M->s);
     for (int stop = 0; stop < fl->n_stops; stop++) {
         if (M->closed[stop]) position++; /* a bond is always closed */
         if (is_bond(fl, stop) || is_second(fl, stop)) continue;

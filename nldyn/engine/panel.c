@@ -16,6 +16,10 @@
 #define ALONG 1e-9   /* of the cosine squared: a slider that moves as a stop does */
 #define STALE 0.1     /* rate from which its matrix is inverted anew */
 
+static bool is_many(const Flow *fl, const Panel *panel);
+static bool solve_many(const Flow *fl, const Gauss *tab, const double *noise, Panel *panel,
+                       Scratch *s);
+
 /* make the panel an empty one for some closed stops */
 static void renew_panel(const Flow *fl, Panel *panel, const int *active, int na)
 {
@@ -126,7 +130,7 @@ static void panel_responses(const Flow *fl, const Gauss *tab, int kind, double h
         double whole[6] = {end.a, end.b, end.c, end.d, swing.less_a, swing.less_d};
         memcpy(panel->whole + 6 * b, whole, sizeof whole);
     }
-    fill_influences(fl, tab, kind, h, panel, s);
+    if (!panel->many) fill_influences(fl, tab, kind, h, panel, s);
 }
 
 /* fill how a complex number of length one has turned, from a phase on, at the nodes of a panel, to
@@ -304,6 +308,10 @@ static double rounded_force(const Flow *fl, const Panel *panel, const double *fo
     int na = panel->na, width = na * panel->m, height = panel->outputs * panel->m;
     int partner = panel->round ? partner_of(fl, panel, a) : -1;
     double error = 0.0;
+    for (int o = a; o < panel->outputs && panel->many; o += na)
+        error += BLIND * SUM_ROUNDING * fabs(panel->output[o * panel->m + i] *
+                                             panel->slope[o * panel->m + i]);
+    if (panel->many) return error;
     for (int o = 0; o < panel->outputs; o++) {
         if (o % na != a && o % na != partner) continue;
         double moved = 0.0;
@@ -369,13 +377,12 @@ static void step_forces(const Flow *fl, Panel *panel, Scratch *s, int iteration)
     memcpy(s->solved, s->led, sizeof(double) * width);
 }
 
-/* put the outputs that the forces lead to in their place; their largest relative change beyond
- * `noise`, or nan */
+/* put the outputs that the forces lead to, s->led, in their place; their largest relative change
+ * beyond `noise`, or nan */
 static double renew_outputs(const Flow *fl, Panel *panel, const Scratch *s, const double *noise)
 {
     int m = panel->m;
     double change = 0.0;
-    with_forces(panel, s->free, s->solved, 0, s->led);
     for (int o = 0; o < panel->outputs; o++) {
         double scale = 0.0, longest = 0.0, total = 0.0;
         for (int i = 0; i < m; i++) {
@@ -402,8 +409,12 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
                         double h, const double *noise, Panel *panel, Scratch *s)
 {
     int count = panel->outputs * panel->m * (panel->round ? 2 : 1);
+    bool many = is_many(fl, panel);
+    if (many != panel->many) panel->made_kind = -1;
+    panel->many = many;
     panel_responses(fl, tab, kind, h, panel, s);
     free_outputs(fl, tab, kind, phase, w, h, panel, s);
+    if (many) return solve_many(fl, tab, noise, panel, s);
     if (panel->outputs > panel->na) guess_rates(fl, panel, s);
     double before = INFINITY;
     for (int iteration = 0; iteration < 60; iteration++) {
@@ -416,6 +427,7 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
             panel->kept = true;
         }
         step_forces(fl, panel, s, iteration);
+        with_forces(panel, s->free, s->solved, 0, s->led);
         double change = renew_outputs(fl, panel, s, noise);
         if (isnan(change)) break;
         /* the error left: goes with the square after a step with a fresh matrix, else linearly;

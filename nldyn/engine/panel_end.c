@@ -100,23 +100,13 @@ static void panel_end(const Flow *fl, const Gauss *tab, int kind, double phase, 
 {
     int na = panel->na, m = panel->m;
     for (int a = 0; a < na; a++) panel->end_depth[a] = panel->depth[a];
-    for (int a = 0; a < na; a++)
-        for (int j = 0; j < m; j++)
-            s->step[a * m + j] = h * tab->weights[kind * m + j] * panel->F[a * m + j];
-    for (int k = 0; k < fl->size; k += 2) {
-        double kick[2] = {0.0, 0.0}; /* what the forces have added, taken back to the start */
-        for (int a = 0; a < na; a++) {
-            const double *back = panel->back + ((size_t)a * fl->size + k) * m;
-            for (int j = 0; j < m; j++) {
-                kick[0] -= s->step[a * m + j] * back[j];
-                kick[1] -= s->step[a * m + j] * back[m + j];
-            }
-        }
-        for (int i = 0; i < 2; i++) {
-            w_end[k + i] = w[k + i] + kick[i];
-            for (int a = 0; a < na; a++)
-                panel->end_depth[a] += row_of(fl, 0, panel->active[a])[k + i] * kick[i];
-        }
+    push_modes(fl, panel, panel->F, s);
+    for (int k = 0; k < fl->size; k++) {
+        double kick = 0.0; /* what the forces have added, taken back to the start */
+        for (int j = 0; j < m; j++) kick -= h * tab->weights[kind * m + j] * s->pushed[k * m + j];
+        w_end[k] = w[k] + kick;
+        for (int a = 0; a < na; a++)
+            panel->end_depth[a] += row_of(fl, 0, panel->active[a])[k] * kick;
     }
     for (int a = 0; a < na; a++)
         panel->end_depth[a] += flown(fl, panel, panel->active[a], phase, w_end, h);
@@ -178,10 +168,16 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
         add_crossed(fl, panel, o, 1.0, s->part, 1, n_columns, s->forces, 1, n_columns, n_columns);
     }
     add_friction(fl, panel, s->forces, n_columns, 1, n_columns);
-    invert_panel(fl, panel);
+    if (panel->many)
+        solve_columns(fl, tab, panel, n_columns, s);
+    else
+        invert_panel(fl, panel);
     for (int a = 0; a < na; a++) {
-        multiply_transposed(fl->watch, panel->inverse + a * m, padded(width), s->forces, s->part,
-                            m, width, n_columns);
+        if (panel->many)
+            memcpy(s->part, s->forces + (size_t)a * m * n_columns, sizeof(double) * m * n_columns);
+        else
+            multiply_transposed(fl->watch, panel->inverse + a * m, padded(width), s->forces,
+                                s->part, m, width, n_columns);
         for (int j = 0; j < m; j++) {
             double *part = s->part + (size_t)j * n_columns, weight = h * tab->weights[kind * m + j];
             for (int c = 0; c < n_columns; c++) part[c] *= weight;
@@ -192,23 +188,15 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
     swing(fl, panel, columns, n_columns);
 }
 
-/* fill `driven` (2n, m): the states at the nodes of a panel, taken back to its start */
-static void drive_back(const Flow *fl, const Gauss *tab, int kind, const double *w, double h,
-                       const Panel *panel, Scratch *s)
+/* fill `driven` (2n, m): the states at the nodes of a panel, taken back to its start; `panel_end` has
+ * filled s->pushed */
+static void drive_back(const Flow *fl, const Gauss *tab, const double *w, const Panel *panel,
+                       Scratch *s)
 {
     int m = panel->m;
-    double *impulses = s->step;
-    for (int k = 0; k < fl->size; k++) {
-        double *driven = s->driven + (size_t)k * m;
-        for (int j = 0; j < m; j++) impulses[j] = 0.0;
-        for (int a = 0; a < panel->na; a++) {
-            const double *back = panel->back + ((size_t)a * fl->size + k) * m;
-            const double *F = panel->F + (size_t)a * m;
-            for (int j = 0; j < m; j++) impulses[j] -= h * F[j] * back[j];
-        }
-        combine(driven, NULL, m, tab->integrate + (size_t)kind * m * m, m, impulses, 1, m);
-        for (int i = 0; i < m; i++) driven[i] += w[k];
-    }
+    carry_modes(fl, tab, panel, s);
+    for (int k = 0; k < fl->size; k++)
+        for (int i = 0; i < m; i++) s->driven[k * m + i] = w[k] + s->carried[k * m + i];
 }
 
 /* fill an output at the nodes of a panel, (m,), with the forces at work; s->driven is filled */

@@ -105,6 +105,8 @@ static void lay_out_contacts(Block *block, const Flow *fl, const Gauss *tab, Scr
     s->shift = numbers(block, size);
     s->kick = numbers(block, size);
     s->hold_order = indices(block, na);
+    s->pushed = numbers(block, size * m);
+    s->carried = numbers(block, size * m);
 }
 
 static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Scratch *s)
@@ -113,6 +115,11 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     s->forces = numbers(block, na * m * n_columns);
     s->part = numbers(block, (size_t)m * n_columns);
     s->change = numbers(block, n_columns);
+    if (na * m >= MANY) {
+        s->added = numbers(block, na * m * n_columns);
+        s->part_many = numbers(block, (size_t)m * n_columns);
+        s->flown = numbers(block, size * m * n_columns);
+    }
     s->stop_forces = numbers(block, na);
     s->pushes = numbers(block, na);
     s->first_pushes = numbers(block, na);

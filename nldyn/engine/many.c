@@ -1,0 +1,166 @@
+/* Panels with many closed stops: their forces by iteration.
+ *
+ * What a force does within a panel grows with its length squared over that of a swing on the stops,
+ * so that forces and what they lead to, in turn, come to rest, the faster the shorter the panel
+ * [Volterra]. The way from forces at the nodes to outputs goes by the modes, where the stops are
+ * more than these: no matrix of all influences is made, none is inverted. */
+#include "engine.h"
+
+#define MANY 128      /* unknown forces at the nodes from which on they are found so */
+#define WORST_RATE 0.5 /* of convergence: a panel that takes longer is to be shorter */
+#define MOST_TURNS 60
+
+/* whether the forces of a panel are found by iteration: they are many, each a smooth law's */
+static bool is_many(const Flow *fl, const Panel *panel)
+{
+    if (panel->na * panel->m < MANY || panel->round) return false;
+    for (int a = 0; a < panel->na; a++)
+        if (is_held(fl, panel->active[a]) || is_bond(fl, panel->active[a])) return false;
+    return true;
+}
+
+/* fill s->pushed (2n, m): what forces (na, m) push the modes by, taken back to the start */
+static void push_modes(const Flow *fl, const Panel *panel, const double *force, Scratch *s)
+{
+    int m = panel->m, size = fl->size;
+    memset(s->pushed, 0, sizeof(double) * size * m);
+    for (int a = 0; a < panel->na; a++) {
+        const double *restrict back = panel->back + (size_t)a * size * m, *F = force + (size_t)a * m;
+        for (int k = 0; k < size; k++) {
+            double *restrict pushed = s->pushed + (size_t)k * m;
+            for (int j = 0; j < m; j++) pushed[j] += back[k * m + j] * F[j];
+        }
+    }
+}
+
+/* fill s->carried (2n, m): the modes at the nodes, taken back to the start, by s->pushed */
+static void carry_modes(const Flow *fl, const Gauss *tab, const Panel *panel, Scratch *s)
+{
+    int m = panel->m;
+    const double *integrate = tab->integrate + (size_t)panel->made_kind * m * m;
+    for (int k = 0; k < fl->size; k++) {
+        double *restrict carried = s->carried + (size_t)k * m;
+        for (int i = 0; i < m; i++) carried[i] = 0.0;
+        for (int j = 0; j < m; j++) {
+            double impulse = -panel->made_length * s->pushed[k * m + j];
+            for (int i = 0; i < m; i++) carried[i] += integrate[j * m + i] * impulse;
+        }
+    }
+}
+
+/* fill the outputs (outputs, m) with those of free motion and what forces (na, m) add */
+static void outputs_by_modes(const Flow *fl, const Gauss *tab, const Panel *panel,
+                             const double *free, const double *force, double *output, Scratch *s)
+{
+    int m = panel->m, size = fl->size;
+    push_modes(fl, panel, force, s);
+    carry_modes(fl, tab, panel, s);
+    for (int o = 0; o < panel->outputs; o++) {
+        const double *restrict to = panel->to + (size_t)o * size * m;
+        double *restrict found = output + (size_t)o * m;
+        for (int i = 0; i < m; i++) found[i] = free[o * m + i];
+        for (int k = 0; k < size; k++)
+            for (int i = 0; i < m; i++) found[i] += to[k * m + i] * s->carried[k * m + i];
+    }
+}
+
+/* `solve_panel` by forces and outputs in turn; the responses and free outputs are filled */
+static bool solve_many(const Flow *fl, const Gauss *tab, const double *noise, Panel *panel,
+                       Scratch *s)
+{
+    int width = panel->na * panel->m;
+    double before = INFINITY;
+    for (int turn = 0; turn < MOST_TURNS; turn++) {
+        panel_forces(fl, panel, panel->slope);
+        memcpy(s->solved, panel->F, sizeof(double) * width);
+        outputs_by_modes(fl, tab, panel, s->free, s->solved, s->led, s);
+        double change = renew_outputs(fl, panel, s, noise);
+        if (isnan(change)) return false;
+        double rate = change > 0.0 ? change / before : 0.0;
+        if (turn > 0 && change * rate / larger(1.0 - rate, SLOWEST) <= SOLVED) {
+            panel_forces(fl, panel, panel->slope);
+            if (consistent(fl, panel, s->solved, noise)) return true;
+        }
+        if (turn > 4 && rate > WORST_RATE) return false;
+        before = change;
+    }
+    return false;
+}
+
+/* fill s->flown (2n, m, n_columns): `carry_modes` of columns of forces (na, m, n_columns) */
+static void carry_columns(const Flow *fl, const Gauss *tab, const Panel *panel, int n_columns,
+                          const double *forces, Scratch *s)
+{
+    int m = panel->m, size = fl->size;
+    size_t row = (size_t)m * n_columns;
+    const double *integrate = tab->integrate + (size_t)panel->made_kind * m * m;
+    for (int k = 0; k < size; k++) {
+        memset(s->part_many, 0, sizeof(double) * row);
+        for (int a = 0; a < panel->na; a++)
+            for (int j = 0; j < m; j++) {
+                double back = panel->back[((size_t)a * size + k) * m + j];
+                const double *restrict from = forces + a * row + (size_t)j * n_columns;
+                double *restrict to = s->part_many + (size_t)j * n_columns;
+                for (int c = 0; c < n_columns; c++) to[c] += back * from[c];
+            }
+        double *flown_to = s->flown + k * row;
+        memset(flown_to, 0, sizeof(double) * row);
+        for (int i = 0; i < m; i++)
+            for (int j = 0; j < m; j++) {
+                double weight = -panel->made_length * integrate[j * m + i];
+                const double *restrict from = s->part_many + (size_t)j * n_columns;
+                double *restrict to = flown_to + (size_t)i * n_columns;
+                for (int c = 0; c < n_columns; c++) to[c] += weight * from[c];
+            }
+    }
+}
+
+/* fill `next` (na, m, n_columns) with what the forces' slopes make of s->flown */
+static void slopes_of_columns(const Flow *fl, const Panel *panel, int n_columns, double *next,
+                              const Scratch *s)
+{
+    int na = panel->na, m = panel->m, size = fl->size;
+    size_t row = (size_t)m * n_columns;
+    memset(next, 0, sizeof(double) * na * row);
+    for (int o = 0; o < panel->outputs; o++)
+        for (int i = 0; i < m; i++) {
+            double slope = panel->slope[o * m + i];
+            double *restrict to = next + (o % na) * row + (size_t)i * n_columns;
+            for (int k = 0; k < size && slope != 0.0; k++) {
+                double share = slope * panel->to[((size_t)o * size + k) * m + i];
+                const double *restrict from = s->flown + k * row + (size_t)i * n_columns;
+                for (int c = 0; c < n_columns; c++) to[c] += share * from[c];
+            }
+        }
+    add_friction(fl, panel, next, n_columns, 1, n_columns);
+}
+
+/* fill the largest (n_columns,) of each column of rows */
+static void largest_of_columns(const double *rows, size_t count, int n_columns, double *found)
+{
+    for (int c = 0; c < n_columns; c++) found[c] = 0.0;
+    for (size_t p = 0; p < count; p++)
+        for (int c = 0; c < n_columns; c++)
+            found[c] = larger(found[c], fabs(rows[p * n_columns + c]));
+}
+
+/* Replace columns of forces (na, m, n_columns) in s->forces by (1 - slope G)^-1 of them: the sum of
+ * what each turn adds. */
+static void solve_columns(const Flow *fl, const Gauss *tab, const Panel *panel, int n_columns,
+                          Scratch *s)
+{
+    size_t rows = (size_t)panel->na * panel->m, count = rows * n_columns;
+    double *most = s->part, *scale = s->part + n_columns;
+    memcpy(s->added, s->forces, sizeof(double) * count);
+    for (int turn = 0; turn < MOST_TURNS; turn++) {
+        carry_columns(fl, tab, panel, n_columns, s->added, s);
+        slopes_of_columns(fl, panel, n_columns, s->added, s);
+        for (size_t p = 0; p < count; p++) s->forces[p] += s->added[p];
+        largest_of_columns(s->added, rows, n_columns, most);
+        largest_of_columns(s->forces, rows, n_columns, scale);
+        bool settled = true;
+        for (int c = 0; c < n_columns; c++)
+            settled = settled && most[c] <= SUM_ROUNDING * scale[c];
+        if (settled) return;
+    }
+}

@@ -1,0 +1,171 @@
+"""Beams that land on areas of contact: closed forms, an independent integration, quadrature."""
+
+import math
+
+import numpy as np
+import pytest
+
+import cms
+import fem
+from nldyn import (
+    ConstantForce,
+    FlowMap,
+    HarmonicForce,
+    Parameter,
+    System,
+    contact_area,
+    solve_orbit,
+)
+from nldyn.system import rest
+from nldyn.system.chart import value_of, with_value
+from tests.independent import Motion
+
+STEEL = fem.Material(2.1e11, 7800.0)
+SECTION = fem.RectangularSection(0.02, 0.01)
+BENDING = 2.1e11 * 0.02 * 0.01**3 / 12.0
+
+
+def area_of(component, at, direction, stiffness, points, modes, *, tolerance=1e-2, **more):
+    """A reduced model with an area, and the stops of that."""
+    found = fem.contact_points(component, at, direction, points=points)
+    names = [f"bed {i + 1}" for i in range(len(found.places))]
+    bed = cms.Area(names, stiffness * found.weights, tolerance=tolerance)
+    touching = component.with_interfaces(
+        dict(zip(names, found.vectors(), strict=True)), {"bed": bed}
+    )
+    gap = more.pop("gap", lambda x: np.zeros_like(x))(found.places[:, 0])
+    stops = contact_area("bed", names, stiffness, weights=found.weights, gap=gap, **more)
+    return cms.reduce(touching, modes=modes), stops
+
+
+def winkler_deflection(points, lines=24):
+    """Deflection under the load in the middle of a long free beam on a foundation that lifts off.
+
+    Half the beam: its middle neither turns nor moves along.
+    """
+    stiffness = 2e5
+    wave = (stiffness / (4.0 * BENDING)) ** 0.25
+    mesh = fem.frame_mesh(
+        {"middle": (0, 0), "end": (1.6 * math.pi / wave, 0)}, [("half", "middle", "end", lines)]
+    )
+    half = fem.assemble(
+        fem.FrameModel(
+            mesh,
+            parts={"half": fem.BeamPart(STEEL, SECTION)},
+            supports=[fem.Support("middle", ("x", "rotation"))],
+            interfaces={"middle": fem.Interface("middle", "y")},
+        )
+    )
+    reduced, stops = area_of(half, "half", "-y", stiffness, points, 20, tolerance=1e-7)
+    system = System.from_reduced(
+        reduced, modal_damping=0.01, stops=stops, excitation=[ConstantForce("middle", -50.0)]
+    )
+    q = rest(system)
+    depths = np.array([system.stop_vector(stop) @ q for stop in stops])
+    sunk = -float(system.participation["middle"] @ q)
+    return sunk, depths, 2.0 * 50.0 * wave / (2.0 * stiffness) / math.tanh(0.5 * math.pi)
+
+
+def test_a_beam_on_a_foundation_that_lifts_off_sinks_and_parts_as_in_closed_form():
+    """Weitsman 1970: it touches up to λa = π/2, whatever the load; w = Pλ/(2k) coth(π/2)."""
+    for points in (1, 2, 4):
+        sunk, depths, exact = winkler_deflection(points)
+        assert abs(sunk / exact - 1.0) < 2e-5
+        closed = np.flatnonzero(depths > 0.0)
+        assert np.array_equal(closed, np.arange(closed.size))  # one region around the middle
+        share = closed.size / depths.size * 1.6 * math.pi
+        assert abs(share - 0.5 * math.pi) < 1.6 * math.pi / depths.size
+
+
+def landing(points, modes=3, stiffness=2e4, **more):
+    """A cantilever that lands on a curved support."""
+    mesh = fem.frame_mesh({"root": (0, 0), "tip": (0.5, 0)}, [("strip", "root", "tip", 6)])
+    strip = fem.assemble(
+        fem.FrameModel(
+            mesh,
+            parts={"strip": fem.BeamPart(STEEL, fem.RectangularSection(0.02, 0.002))},
+            supports=[fem.Support("root", ("x", "y", "rotation"))],
+            interfaces={"tip": fem.Interface("tip", "y")},
+        )
+    )
+    reduced, stops = area_of(
+        strip, "strip", "-y", stiffness, points, modes, gap=lambda x: 1e-4 + x**2 / 100.0, **more
+    )
+    return System.from_reduced(
+        reduced, modal_damping=0.05, stops=stops, excitation=[HarmonicForce("tip", 0.3)]
+    )
+
+
+@pytest.mark.parametrize(
+    "law",
+    [{}, pytest.param({"exponent": 1.5, "dissipation": 0.5}, marks=pytest.mark.slow)],
+)
+def test_a_landing_is_that_of_an_independent_integration(law):
+    stiffness = 2e4 if not law else 2e6
+    system = landing(2, modes=2, stiffness=stiffness, tolerance=0.3, **law)
+    orbit = solve_orbit(system, 5.0)
+    start = orbit.states(np.zeros(1))[0]
+    omega = 2.0 * np.pi * 5.0
+    end, jacobian, closings = Motion(system).run(start, (0.0, 2.0 * np.pi), omega, max_step=0.01)
+    scale = np.abs(start)
+    scale[: system.size] = scale[: system.size].max()
+    scale[system.size :] = scale[system.size :].max()
+    assert np.all(np.abs(end - start) < 1e-8 * scale)
+    assert sum(closings) == orbit.impacts and np.count_nonzero(closings) > 3
+    expected = np.linalg.eigvals(jacobian)
+    for multiplier in orbit.multipliers:
+        assert np.abs(expected - multiplier).min() < 1e-6
+
+
+def bed(modes=8, points=24):
+    """A string of sines over a curved bed: more points touch at once than there are modes."""
+    orders, places = np.arange(1, modes + 1), (np.arange(points) + 0.5) / points
+    shapes = np.sqrt(2.0) * np.sin(np.pi * np.outer(np.append(0.47, places), orders))
+    names = ["middle", *(f"p{i}" for i in range(points))]
+    stops = contact_area(
+        "bed", names[1:], 1e4, weights=np.full(points, 1.0 / points),
+        gap=3e-4 + 2e-3 * (places - 0.5) ** 2,
+    )  # fmt: skip
+    return System.from_modal(
+        10.0 * orders**1.2, dict(zip(names, shapes, strict=True)), modal_damping=0.02,
+        stops=stops, excitation=[HarmonicForce("middle", 10.0)],
+    )  # fmt: skip
+
+
+def test_many_points_at_once_move_as_in_an_independent_integration():
+    system, omega = bed(), 2.0 * np.pi * 9.0
+    start, turn = np.full(2 * system.size, 1e-6), np.array([0.0, 2.0 * np.pi])
+    flow = FlowMap(system)
+    found = flow.shoot(flow.to_state(start[None]), turn, omega)
+    end, jacobian, closings = Motion(system).run(start, tuple(turn), omega, max_step=0.01)
+    assert found.closings.tolist() == closings and np.count_nonzero(closings) > 15
+    left = system.linear.left
+    off = np.abs(flow.to_modal(found.ends)[0] - end)
+    for half in (slice(0, system.size), slice(system.size, None)):
+        assert off[half].max() < 1e-10 * np.abs(end[half]).max()
+    mine = np.linalg.solve(left, found.jacobians[0] @ left)
+    assert np.abs(mine - jacobian).max() < 1e-8 * np.abs(jacobian).max()
+
+
+def test_derivatives_by_the_numbers_of_an_area_of_many_points_are_those_of_differences():
+    system, omega, turn = bed(), 2.0 * np.pi * 9.0, np.array([0.0, 2.0 * np.pi])
+    start = np.full((1, 2 * system.size), 1e-6)
+    for name, step in (("area_gap", 1e-9), ("area_stiffness", 0.01)):
+        parameter = Parameter(name)
+        exact = FlowMap(system).shoot(start, turn, omega, parameters=[parameter]).d_parameters
+        value = value_of(system, 9.0, parameter)
+        ends = [
+            FlowMap(with_value(system, parameter, value + sign * step))
+            .shoot(start, turn, omega)
+            .ends
+            for sign in (1.0, -1.0)
+        ]
+        differences = (ends[0] - ends[1])[0] / (2.0 * step)
+        assert np.abs(exact[0, :, 0] - differences).max() < 1e-4 * np.abs(differences).max()
+
+
+@pytest.mark.slow
+def test_finer_quadrature_comes_to_one_landing():
+    amplitudes = [solve_orbit(landing(n), 5.0).max_abs_displacement for n in (1, 2, 4)]
+    steps = np.abs(np.diff(amplitudes)) / amplitudes[-1]
+    assert steps[1] < 1e-3 and steps[1] < 0.5 * steps[0]
