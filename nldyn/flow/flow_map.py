@@ -257,7 +257,7 @@ class FlowMap:
     @cached_property
     def _bounds(self) -> PanelBounds:
         """What bounds its panels."""
-        return self.options.panels_for(self.system.size)
+        return self.options.panels_for(self.system.size, len(self.system.stops))
 
     @cached_property
     def rows(self) -> Real:

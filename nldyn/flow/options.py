@@ -17,6 +17,7 @@ from nldyn.engine.layout import ROUND
 FINEST, COARSEST = 1e-13, 1e-2  # relative tolerances that can be met, and that tell orbits apart
 TAIL = 0.3  # of √rtol: the error of a Jacobian goes with the square of a panel's tail
 NODE_ANGLE, NODE_ANGLE_PER_DECADE = 0.95, 0.08  # rad at rtol = 1e-9, and more per power of ten
+FEW_STOPS = 10  # with which events are rare beside the swings of the fastest mode
 FEW_MODES, MOST_NODES = 20, 40  # modes with which panels have the usual nodes; most nodes
 LATEST = 1e-6  # error in the instant of an event, at most, as a share of the panel
 SHARE = 0.01  # of rtol: what the start of an event may add to the error of a Jacobian
@@ -98,15 +99,16 @@ class FlowOptions:
         """
         return NODE_ANGLE + NODE_ANGLE_PER_DECADE * (math.log10(self.rtol) + 9.0)
 
-    def panels_for(self, modes: int) -> PanelBounds:
+    def panels_for(self, modes: int, stops: int = 1) -> PanelBounds:
         """What bounds panels of a system with so many modes, if neither nodes nor tail is given.
 
         Where the fastest mode bounds a panel, one of twice the nodes is more than twice as long:
         the angle goes to 2, short of the π of half an oscillation. Its tail is a third then, so
-        that errors with up to 64 modes are what they are with 14 nodes.
+        that errors with up to 64 modes are what they are with 14 nodes. Where there are many stops,
+        their events bound panels sooner.
         """
         few = self.panel_nodes
-        if self.nodes is not None or self.tail is not None:
+        if self.nodes is not None or self.tail is not None or stops > FEW_STOPS:
             return PanelBounds(few, self.panel_tail, self.node_angle)
         more = max(0, min(modes - FEW_MODES, MOST_NODES - few))
         angle = 2.0 - (2.0 - self.node_angle) * (few / (few + more)) ** 0.4

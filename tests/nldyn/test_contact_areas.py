@@ -49,11 +49,12 @@ def winkler_deflection(points, lines=24):
         {"middle": (0, 0), "end": (1.6 * math.pi / wave, 0)}, [("half", "middle", "end", lines)]
     )
     half = fem.assemble(
-        fem.FrameModel(
+        fem.StructureModel(
             mesh,
             parts={"half": fem.BeamPart(STEEL, SECTION)},
             supports=[fem.Support("middle", ("x", "rotation"))],
             interfaces={"middle": fem.Interface("middle", "y")},
+            plane=True,
         )
     )
     reduced, stops = area_of(half, "half", "-y", stiffness, points, 20, tolerance=1e-7)
@@ -81,11 +82,12 @@ def landing(points, modes=3, stiffness=2e4, **more):
     """A cantilever that lands on a curved support."""
     mesh = fem.frame_mesh({"root": (0, 0), "tip": (0.5, 0)}, [("strip", "root", "tip", 6)])
     strip = fem.assemble(
-        fem.FrameModel(
+        fem.StructureModel(
             mesh,
             parts={"strip": fem.BeamPart(STEEL, fem.RectangularSection(0.02, 0.002))},
             supports=[fem.Support("root", ("x", "y", "rotation"))],
             interfaces={"tip": fem.Interface("tip", "y")},
+            plane=True,
         )
     )
     reduced, stops = area_of(
