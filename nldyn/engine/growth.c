@@ -47,7 +47,8 @@ EXPORT int64_t nldyn_growth_rates(const Host *host, int64_t k, int64_t count,
     int n = (int)count;
     Watch watch;
     begin_watch(&watch, host);
-    for (int64_t step = 0; step < k && !(step % 64 == 63 && interrupted(&watch)); step++) {
+    int pause = n > 32 ? 1 : 64; /* steps between two looks */
+    for (int64_t step = 0; step < k && !(step % pause == pause - 1 && interrupted(&watch)); step++) {
         const double *jacobian = jacobians + (size_t)step * n * n;
         double size = 0.0;
         for (int i = 0; i < n * n; i++) size += squared(jacobian[i]);

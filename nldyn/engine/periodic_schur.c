@@ -10,6 +10,7 @@
  * length neither overflow nor underflow. */
 #include "engine.h"
 
+#define SMALL_MATRIX 16 /* of so many rows: the eigenvalues of a product take no time */
 #define MOST_QR_STEPS 150 /* for one or two eigenvalues; three or four are usual, thirty at a triple */
 #define PATIENCE 50 /* steps before entries at the rounding level of a factor count as zero */
 #define ANY_NUMBER 4000.0 /* powers of 2 that take any number, and one near 1, to 0 */
@@ -315,7 +316,7 @@ static bool deflate_all(const Factors *A, Complex *values, double *exponents, do
             hi -= 2;
             steps = 0;
         } else if (!split_at_zero(A, lo, hi, steps > PATIENCE ? FEW * DBL_EPSILON : 0.0)) {
-            if (steps == MOST_QR_STEPS) return false;
+            if (steps == MOST_QR_STEPS || ended(A)) return false;
             double_step(A, lo, hi, steps % 10 == 5, steps % 40 == 39);
             steps++;
         }
@@ -345,9 +346,9 @@ static void sort_values(int n, const Complex *values, const double *exponents, d
  * beyond the range of numbers; the natural logarithms (n,) of the moduli, -inf for zero; and the
  * smallest factor by which one of the matrices multiplies a direction of the periodic Schur form,
  * relative to the matrix's largest entry. */
-EXPORT int64_t nldyn_product_eigenvalues(int64_t k, int64_t n, const double *factors,
-                                         Complex *multipliers, double *logarithms,
-                                         double *squeeze)
+EXPORT int64_t nldyn_product_eigenvalues(const Host *host, int64_t k, int64_t n,
+                                         const double *factors, Complex *multipliers,
+                                         double *logarithms, double *squeeze)
 {
     size_t count = (size_t)k * n * n;
     *squeeze = 0.0;
@@ -357,7 +358,9 @@ EXPORT int64_t nldyn_product_eigenvalues(int64_t k, int64_t n, const double *fac
     }
     double *memory = malloc(sizeof(double) * (count + 5 * n + 1));
     if (!memory) return -1;
-    Factors A = {memory, memory + count, (int)k, (int)n};
+    Watch watch;
+    Factors A = {memory, memory + count, (int)k, (int)n, n > SMALL_MATRIX ? &watch : NULL};
+    if (A.watch) begin_watch(A.watch, host);
     Complex *values = (Complex *)(memory + count + 2 * n);
     double *exponents = memory + count + 4 * n;
     memcpy(A.entries, factors, sizeof(double) * count);
@@ -369,6 +372,7 @@ EXPORT int64_t nldyn_product_eigenvalues(int64_t k, int64_t n, const double *fac
         converged = deflate_all(&A, values, exponents, squeeze);
         sort_values((int)n, values, exponents, exponent, multipliers, logarithms);
     }
+    if (A.watch) end_watch(A.watch);
     free(memory);
     return converged;
 }

@@ -7,7 +7,10 @@
 typedef struct {
     double *entries, *turns; /* turns: (n, 2) scratch */
     int k, n;
+    Watch *watch; /* none where they are small */
 } Factors;
+
+static bool ended(const Factors *A) { return A->watch && interrupted(A->watch); }
 
 typedef struct {
     double cosine, sine;
@@ -104,13 +107,13 @@ static void reduce(const Factors *A)
 {
     int hi = A->n - 1;
     for (int j = 0; j < A->k - 1; j++)
-        for (int c = 0; c < hi; c++)
+        for (int c = 0; c < hi && !ended(A); c++)
             for (int i = hi - 1; i >= c; i--) {
                 Rotation turn = rotation(*entry(A, j, i, c), *entry(A, j, i + 1, c));
                 turn_rows(A, j, i, turn, c, hi);
                 *entry(A, j, i + 1, c) = 0.0;
                 turn_columns(A, j + 1, i, turn, 0, hi);
             }
-    for (int c = 0; c < hi - 1; c++)
+    for (int c = 0; c < hi - 1 && !ended(A); c++)
         for (int i = hi - 1; i > c; i--) annihilate(A, i, c, hi, 0, hi);
 }

@@ -7,10 +7,12 @@ import ctypes
 import numpy as np
 
 from nldyn.base.arrays import Complex, Real
-from nldyn.engine.library import address_of, function
+from nldyn.engine.library import HOST, address_of, function
 from nldyn.engine.numbers import reals
 
-_eigenvalues = function("nldyn_product_eigenvalues", *[ctypes.c_int64] * 2, *[ctypes.c_void_p] * 4)
+_eigenvalues = function(
+    "nldyn_product_eigenvalues", ctypes.c_char_p, *[ctypes.c_int64] * 2, *[ctypes.c_void_p] * 4
+)
 
 
 def product_eigenvalues(factors: Real) -> tuple[Complex, Real, float, bool]:
@@ -32,7 +34,7 @@ def product_eigenvalues(factors: Real) -> tuple[Complex, Real, float, bool]:
     multipliers, logarithms = np.empty(n, dtype=np.complex128), np.empty(n)
     squeeze = ctypes.c_double()
     converged = _eigenvalues(
-        k, n, address_of(factors), address_of(multipliers), address_of(logarithms),
+        HOST, k, n, address_of(factors), address_of(multipliers), address_of(logarithms),
         ctypes.addressof(squeeze),
     )  # fmt: skip
     if converged < 0:
