@@ -12,13 +12,15 @@ from scipy.integrate import solve_ivp
 from nldyn.system import Friction
 
 Vector = NDArray[np.float64]
+FIRST_STEP = 1e-7  # behind an event, which another one may follow at once
+ROUNDED = 1.0 + 1e-12  # times its friction: what slips no more than a rounding before
 
 
 @dataclass(frozen=True)
 class Contact:
     """Where a body slides along `tangent`, pressed on by a constant force or by a stop.
 
-    The stop is k (normal . q - gap)^p.
+    The stop is k (normal . q - gap)^p. A spring may give way before what slides.
     """
 
     tangent: Vector
@@ -28,6 +30,7 @@ class Contact:
     stiffness: float = 0.0
     exponent: float = 1.0
     gap: float = 0.0
+    spring: float | None = None
 
     def depth(self, y: Vector) -> float:
         return float(self.normal @ y[: self.normal.size]) - self.gap
@@ -38,7 +41,23 @@ class Contact:
         return self.stiffness * max(self.depth(y), 0.0) ** self.exponent
 
     def slip(self, y: Vector) -> float:
-        return float(self.tangent @ y[self.tangent.size :]) - self.law.base_speed
+        n = self.tangent.size
+        return float(self.tangent @ y[n : 2 * n]) - self.law.base_speed
+
+    def pressing_pace(self, y: Vector) -> float:
+        if self.normal is None or self.depth(y) <= 0.0:
+            return 0.0
+        n, p = self.normal.size, self.exponent
+        return self.stiffness * p * self.depth(y) ** (p - 1.0) * float(self.normal @ y[n : 2 * n])
+
+    def place_pace(self, y: Vector, mode: float) -> float:
+        """Speed of what slides behind a spring, beside what it slides on."""
+        if mode == 0.0:
+            return 0.0
+        if np.isnan(mode):
+            return self.slip(y)
+        assert self.spring is not None
+        return self.slip(y) - mode * self.law.coefficient * self.pressing_pace(y) / self.spring
 
 
 @dataclass(frozen=True)
@@ -57,7 +76,8 @@ class Wall:
 class Body:
     """M q'' + C q' + K q = load(t) - contact forces, with a mode of each contact.
 
-    It rebounds from walls, and does not come to rest on them.
+    It rebounds from walls, and does not come to rest on them. After q and q' the state has the
+    places of what slides behind springs.
 
     Modes: nan for an open one, 0 where it sticks, else the sign of its speed. Times and ways are
     what `followed` adds up: how long each contact sticks and slides, and how far.
@@ -76,14 +96,16 @@ class Body:
 
     def acting(self, t: float, y: Vector) -> tuple[Vector, dict[int, float]]:
         """All forces, and what holds those that stick."""
-        n = y.size // 2
-        total = self.load(t) - self.damping @ y[n:] - self.stiffness @ y[:n]
+        n = len(self.mass)
+        total = self.load(t) - self.damping @ y[n : 2 * n] - self.stiffness @ y[:n]
         held = []
         for i, (contact, mode) in enumerate(zip(self.contacts, self.modes, strict=True)):
             normal = contact.pressed(y)
             if contact.normal is not None:
                 total = total - contact.normal * normal
-            if mode == 0.0:
+            if mode == 0.0 and contact.spring is not None:
+                total = total - contact.tangent * self.pull(i, y)
+            elif mode == 0.0:
                 held.append(i)
             elif not np.isnan(mode):
                 law = float(contact.law.at(contact.slip(y)))
@@ -96,8 +118,22 @@ class Body:
         return total - rows.T @ forces, dict(zip(held, forces.tolist(), strict=True))
 
     def rate(self, t: float, y: Vector) -> Vector:
-        n = y.size // 2
-        return np.concatenate([y[n:], np.linalg.solve(self.mass, self.acting(t, y)[0])])
+        n = len(self.mass)
+        places = [
+            contact.place_pace(y, mode) + contact.law.base_speed
+            for contact, mode in zip(self.contacts, self.modes, strict=True)
+            if contact.spring is not None
+        ]
+        accelerations = np.linalg.solve(self.mass, self.acting(t, y)[0])
+        return np.concatenate([y[n : 2 * n], accelerations, places])
+
+    def strain(self, i: int, y: Vector) -> float:
+        n, contact = len(self.mass), self.contacts[i]
+        before = sum(other.spring is not None for other in self.contacts[:i])
+        return float(contact.tangent @ y[:n]) - float(y[2 * n + before])
+
+    def pull(self, i: int, y: Vector) -> float:
+        return float(self.contacts[i].spring or 0.0) * self.strain(i, y)
 
     def let_slip(self, t: float, y: Vector) -> None:
         """Let those slide that need more than their friction to stick, one by one."""
@@ -119,7 +155,18 @@ class Body:
             np.nan if c.normal is not None and c.depth(y) < 0.0 else self.pressed_mode(c, y)
             for c in self.contacts
         ]
+        for i, contact in enumerate(self.contacts):
+            if contact.spring is not None and not np.isnan(self.modes[i]):
+                self.modes[i] = self.sprung_mode(i, y)
         self.let_slip(t, y)
+
+    def sprung_mode(self, i: int, y: Vector) -> float:
+        """Whether what is behind a spring slides on, where its friction is reached."""
+        contact, force, most = self.contacts[i], self.pull(i, y), self.grip(i, y)
+        if abs(force) < most * (1.0 - 1e-9):
+            return 0.0
+        way = float(np.sign(force if most > 1e-12 else contact.slip(y)))
+        return way if way * contact.place_pace(y, way) > 1e-12 else 0.0
 
     def pressed_mode(self, contact: Contact, y: Vector) -> float:
         return float(np.sign(contact.slip(y))) if abs(contact.slip(y)) > 1e-12 else 0.0
@@ -132,6 +179,9 @@ class Body:
                 found.append((i, "switch", lambda t, y, c=contact, s=sign: s * c.depth(y)))
             if mode == 0.0:
                 found.append((i, "slip", lambda t, y, i=i: self._margin(t, y, i)))
+            elif not np.isnan(mode) and contact.spring is not None:
+                pace = lambda t, y, c=contact, s=mode: s * c.place_pace(y, s)  # noqa: E731
+                found.append((i, "stop", pace))
             elif not np.isnan(mode):
                 found.append((i, "stop", lambda t, y, c=contact, s=mode: s * c.slip(y)))
         for i, wall in enumerate(self.walls):
@@ -141,35 +191,75 @@ class Body:
         return found
 
     def _margin(self, t: float, y: Vector, i: int) -> float:
-        return self.grip(i, y) - abs(self.acting(t, y)[1][i])
+        return ROUNDED * self.grip(i, y) - abs(self.holding(t, y, i))
+
+    def holding(self, t: float, y: Vector, i: int) -> float:
+        return self.pull(i, y) if self.contacts[i].spring else self.acting(t, y)[1][i]
 
     def pass_event(self, t: float, y: Vector, i: int, kind: str) -> Vector:
         if kind == "hit":
             return self.rebound(t, y, self.walls[i])
-        contact = self.contacts[i]
+        contact, y = self.contacts[i], self.placed(y)
         if kind == "slip":
-            self.modes[i] = float(np.sign(self.acting(t, y)[1][i]))
+            self.modes[i] = float(np.sign(self.holding(t, y, i)))
+            for j, other in enumerate(self.contacts):  # a chain that came to rest at once
+                held = other.spring is not None and self.modes[j] == 0.0
+                if held and self._margin(t, y, j) < 1e-9 * self.grip(j, y):
+                    self.modes[j] = self.sprung_mode(j, y)
         elif kind == "switch":
             opens = not np.isnan(self.modes[i])
             self.modes[i] = np.nan if opens else self.pressed_mode(contact, y)
+            if contact.spring is not None and not opens:
+                self.modes[i] = self.closing_mode(i, y)
             self.let_slip(t, y)
+        elif contact.spring is not None:
+            for j, other in enumerate(self.contacts):  # a chain comes to rest at once
+                slides = other.spring is not None and abs(self.modes[j]) == 1.0
+                if slides and abs(other.place_pace(y, self.modes[j])) < 1e-9:
+                    self.modes[j] = 0.0
+            self.modes[i] = 0.0
         else:
             self.modes[i] = 0.0
             push = np.linalg.solve(self.mass, contact.tangent)
             y = y.copy()
-            y[push.size :] -= push * contact.slip(y) / float(contact.tangent @ push)
+            y[push.size : 2 * push.size] -= push * contact.slip(y) / float(contact.tangent @ push)
             self.let_slip(t, y)
         return y
 
+    def placed(self, y: Vector) -> Vector:
+        """The state with what slides behind springs, or is free, exactly where it is."""
+        y = y.copy()
+        for j, contact in enumerate(self.contacts):
+            if contact.spring is None or self.modes[j] == 0.0:
+                continue
+            n, before = len(self.mass), sum(c.spring is not None for c in self.contacts[:j])
+            pull = 0.0 if np.isnan(self.modes[j]) else self.modes[j] * self.grip(j, y)
+            y[2 * n + before] = float(contact.tangent @ y[:n]) - pull / contact.spring
+        return y
+
+    def closing_mode(self, i: int, y: Vector) -> float:
+        """The mode behind a spring from a touch on, where both forces grow from nothing."""
+        contact = self.contacts[i]
+        n, speed = len(self.mass), contact.slip(y)
+        growth = 0.0
+        if contact.exponent == 1.0 and contact.normal is not None:
+            growth = contact.stiffness * float(contact.normal @ y[n : 2 * n])
+        slides = float(contact.spring or 0.0) * abs(speed) > contact.law.coefficient * growth
+        return float(np.sign(speed)) if slides else 0.0
+
     def rebound(self, t: float, y: Vector, wall: Wall) -> Vector:
         """The state behind an impact; what acts then slides or sticks by its new speed."""
-        n, push = y.size // 2, np.linalg.solve(self.mass, wall.normal)
+        n, push = len(self.mass), np.linalg.solve(self.mass, wall.normal)
         y = y.copy()
-        speed = float(wall.normal @ y[n:])
-        y[n:] -= push * (1.0 + wall.restitution) * speed / float(wall.normal @ push)
+        speed = float(wall.normal @ y[n : 2 * n])
+        y[n : 2 * n] -= push * (1.0 + wall.restitution) * speed / float(wall.normal @ push)
         self.modes = [
-            mode if np.isnan(mode) else self.pressed_mode(contact, y)
-            for contact, mode in zip(self.contacts, self.modes, strict=True)
+            mode
+            if np.isnan(mode)
+            else self.pressed_mode(contact, y)
+            if contact.spring is None
+            else self.sprung_mode(i, y)
+            for i, (contact, mode) in enumerate(zip(self.contacts, self.modes, strict=True))
         ]
         self.let_slip(t, y)
         return y
@@ -183,7 +273,8 @@ class Body:
             events = self.events()
             run = solve_ivp(
                 self.rate, (t, end), y, method="DOP853", rtol=1e-12, atol=1e-15,
-                max_step=longest, events=[event for _, _, event in events],
+                max_step=longest, first_step=min(FIRST_STEP, end - t),
+                events=[event for _, _, event in events],
             )  # fmt: skip
             self.add_up(float(run.t[-1]) - t, run.y[:, -1] - y)
             t, y = float(run.t[-1]), run.y[:, -1]

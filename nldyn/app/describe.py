@@ -214,6 +214,8 @@ def describe_slider(slider: Slider, length: str = "m") -> str:
     told = f"friction {where}: coefficient {law.coefficient:.6g}"
     told += f", at rest {law.at_rest:.6g}" if law.adhesion else ""
     told += f", base at {law.base_speed:.6g} {length}/s" if law.base_speed else ""
+    if slider.tangential_stiffness is not None:
+        told += f", behind {slider.tangential_stiffness:.6g} {moment_unit(length)}/{length}"
     force = f"{slider.normal_force:.6g} {moment_unit(length)}"
     pressing = f"stop {slider.stop}" if slider.stop >= 0 else force
     return f"{told}, pressed on by {pressing}"

@@ -15,6 +15,7 @@
 #include "panel.c"
 #include "many.c"
 #include "panel_end.c"
+#include "tangent_springs.c"
 #include "guess.c"
 #include "events.c"
 #include "contact.c"

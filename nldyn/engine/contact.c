@@ -6,6 +6,7 @@
 #define NEAR_END 1e-3 /* of a panel: an event that it aims at and that happens so near its end */
 #define INSTANTS 5.0 /* the same of another event: in errors of its instant, at most */
 #define FARTHEST_END 1e-7
+#define LET_GO 1e-5 /* the same of a slider that is let go at the end: its force is as small there */
 #define MISSED 0.01 /* of the panel first tried: no event in one so short: it is farther off, */
 #define FARTHER 10.0 /* and the next panel is so many times longer */
 #define WITHIN 1e-6 /* of a panel: a doubtful place nearer to an end is that of a known switch */
@@ -127,7 +128,9 @@ static int reach_aim(Motion *M, Trial *trial, bool event, bool fine)
     if (is_slider(fl, aim)) {
         dh = time_to_slip(M, aim, trial->kind, end_phase, h, &off);
         there = fabs(dh) <= RELEASED * h ||
-                (fl->slides[aim] != 0 && fabs(off) <= rate_noise(fl, aim, M->w));
+                (is_sprung(fl, aim) && fabs(dh) <= SUM_ROUNDING * end_phase / fl->omega) ||
+                (is_strained(fl, aim) && fabs(off) <= strain_noise(fl, aim, w)) ||
+                (fl->slides[aim] != 0 && fabs(off) <= drag_noise(fl, aim, w, end_phase));
     } else if (ends_smoothly(fl, aim, M->closed)) {
         dh = time_to_release(M->tab, aim, trial->kind, h, M->panel);
         there = fabs(dh) <= RELEASED * h;
@@ -163,6 +166,9 @@ static int judge(Motion *M, Trial *trial, Event event, bool fine, bool lost)
     double near_end = NEAR_END;
     if (event.stop >= 0 && event.stop != trial->aim) /* so near that `switch_with` will find it */
         near_end = larger(smaller(INSTANTS * stop_of(fl, event.stop)->instant, FARTHEST_END), AT_ONCE);
+    if (trial->aim >= 0 && event.stop >= 0 && is_sprung(fl, event.stop) &&
+        (int)stop_of(fl, event.stop)->normal == trial->aim)
+        near_end = larger(near_end, LET_GO);
     bool ends = event.where > 1.0 - near_end;
     if (event.stop >= 0 && (trial->aim < 0 || !ends) && !lost) {
         int goal = ends_smoothly(fl, event.stop, M->closed) ? trial->smooth : trial->to_switch;

@@ -93,12 +93,16 @@ typedef struct {
     double surface;     /* speed in that sense of the surface on that of the other side */
     double area;        /* number of the area of contact that it is a point of, or -1 */
     double share;       /* what of that it stands for: change of its stiffness with the area's */
+    double tangential;  /* of a slider behind a spring: its stiffness */
+    double place;       /* entry of the state that is the slider's own place, or -1 */
+    double place_rate;  /* rate of that entry where it sticks */
 } Stop;
 
 enum Column {
     GAP, STIFFNESS, EXPONENT, DISSIPATION, DASHPOT, MOBILITY, DURATION, INSTANT, RESTITUTION, BOND,
     DRAG, CUBIC, RELEASE, FRICTION, ADHESION, FADING, BELT, NORMAL, PRESSING,
-    SECOND, LEAD, CENTRE, SENSE, RUB, SURFACE, AREA, SHARE, FIRST_POWER
+    SECOND, LEAD, CENTRE, SENSE, RUB, SURFACE, AREA, SHARE, TANGENTIAL,
+    PLACE, PLACE_RATE, FIRST_POWER
 };
 
 /* A system. Outputs are the penetrations of the stops, the displacements of sliders and bonds and
@@ -226,8 +230,9 @@ typedef struct {
     double *forces, *part, *change;                    /* panel_columns */
     double *pushed, *carried, *added, *part_many, *flown; /* panels of many stops */
     double *stop_forces, *pushes, *first_pushes, *held, *mobility; /* rigid stops */
+    double *drags; /* (n_stops,) speeds of the places of sliders behind springs, see `drag_speed` */
     int *resting, *mobility_order;
-    double *rate, *moved, *moved_shift, *along, *offsets;
+    double *rate, *moved, *moved_shift, *along, *along_columns, *offsets;
     bool *struck, *still;
 } Scratch;
 

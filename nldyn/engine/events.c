@@ -77,7 +77,7 @@ static double coarsest_instant(const Flow *fl)
 /* speed of a slider along what it slides on, in the sense in which it slides */
 static double slip(const Flow *fl, int s, const double *w, double phase)
 {
-    return fl->slides[s] * (output_now(fl, s, w, phase).first - stop_of(fl, s)->belt);
+    return fl->slides[s] * drag_speed(fl, s, fl->slides[s], w, phase);
 }
 
 /* fill values (m,) at the nodes of a panel, positive as long as a slider at a place among the
@@ -88,7 +88,7 @@ static void show_slider(const Flow *fl, const Panel *panel, int position, int si
     for (int i = 0; i < m; i++)
         if (fl->slides[s] != 0)
             values[i] = fl->slides[s] * (panel->output[(panel->na + position) * m + i] -
-                                         stop_of(fl, s)->belt);
+                                         stop_of(fl, s)->belt) - grip_pace(fl, panel, s, i);
         else
             values[i] = grip(fl, s) * normal_at(fl, panel, s, i) -
                         side * panel->F[position * m + i];
@@ -117,9 +117,10 @@ static bool at_switch(const Flow *fl, int stop, const double *w, double phase, d
 {
     Course at = watched_pace(fl, stop, closed, w, phase);
     int out = watched(fl, stop, closed, w, phase);
+    if (is_strained(fl, stop)) return at_grip(fl, stop, w, phase, allowed);
     if (is_slider(fl, stop)) /* where it sticks, the state does not tell */
         return fabs(slip(fl, stop, w, phase)) <=
-               allowed * fabs(at.second) + 10.0 * rate_noise(fl, stop, w);
+               allowed * fabs(at.second) + 10.0 * drag_noise(fl, stop, w, phase);
     double instant = allowed + 10.0 * SUM_ROUNDING * phase / fl->omega;
     return fabs(at.value) <= instant * fabs(at.first) + 10.0 * gap_noise(fl, out, w);
 }
@@ -307,10 +308,11 @@ static Shown show_friction(const Motion *M, double phase, double h, int s, int p
     values[0] = at_start(tab, inner);
     values[m + 1] = at_end(tab, inner);
     Shown shown = {pressing_noise(fl, s, M->w) / stop_of(fl, s)->mobility, 0.0, 0.0};
+    if (is_strained(fl, s)) shown.noise = strain_noise(fl, s, M->w);
     if (fl->slides[s] != 0) {
         values[0] = slip(fl, s, M->w, phase);
         values[m + 1] = slip(fl, s, M->w_end, phase + fl->omega * h);
-        shown = (Shown){rate_noise(fl, s, M->w), 0.0, values[1] - values[0]};
+        shown = (Shown){drag_noise(fl, s, M->w, phase), 0.0, values[1] - values[0]};
     }
     refine(tab, values, scratch->fine);
     shown.tail = 4.0 * legendre_tail(tab, inner);
@@ -362,7 +364,7 @@ static void find_event(const Motion *M, int kind, double phase, double h, int st
 static bool held_open(const Motion *M, int stop)
 {
     for (int s = 0; s < M->fl->n_stops; s++)
-        if (is_slider(M->fl, s) && M->closed[s] && M->fl->slides[s] == 0 &&
+        if (is_slider(M->fl, s) && M->closed[s] && is_held(M->fl, s) &&
             moves_with(M->fl, s, stop))
             return true;
     return false;
@@ -378,7 +380,7 @@ static Event first_event(const Motion *M, int kind, double phase, double h)
     for (int stop = 0; stop < fl->n_stops; stop++) {
         if (M->closed[stop]) position++; /* a bond is always closed */
         if (is_bond(fl, stop) || is_second(fl, stop)) continue;
-        if (is_slider(fl, stop) && !M->closed[stop]) continue;
+        if (is_slider(fl, stop) && (!M->closed[stop] || slides_freely(fl, stop))) continue;
         if (is_rigid(fl, stop) && !M->closed[stop] && held_open(M, stop)) continue;
         if (!is_slider(fl, stop)) {
             int out = watched(fl, stop, M->closed, M->w, phase);

@@ -32,10 +32,15 @@ static bool is_rigid(const Flow *fl, int s) { return stop_of(fl, s)->restitution
 
 static bool is_slider(const Flow *fl, int s) { return stop_of(fl, s)->friction >= 0.0; }
 
+/* whether a slider is behind a spring, and whether it sticks and that alone gives way */
+static bool is_sprung(const Flow *fl, int s) { return stop_of(fl, s)->place >= 0.0; }
+
+static bool is_strained(const Flow *fl, int s) { return is_sprung(fl, s) && fl->slides[s] == 0; }
+
 /* whether a force keeps an acceleration at zero: that of a rigid gap, or of a slider that sticks */
 static bool is_held(const Flow *fl, int s)
 {
-    return is_rigid(fl, s) || (is_slider(fl, s) && fl->slides[s] == 0);
+    return is_rigid(fl, s) || (is_slider(fl, s) && fl->slides[s] == 0 && !is_sprung(fl, s));
 }
 
 /* whether a row is the first direction of a round clearance, or the second */
@@ -120,6 +125,8 @@ static Force law(const Flow *fl, int s, double delta, double speed)
     const Stop *stop = stop_of(fl, s);
     Force none = {0.0, 0.0, 0.0};
     if (is_bond(fl, s)) return bond_law(fl, s, delta, speed);
+    if (is_strained(fl, s))
+        return (Force){stop->tangential * delta, stop->tangential, 0.0};
     if (is_slider(fl, s)) return sliding_law(fl, s, speed, stop->pressing);
     if (delta <= 0.0 || is_rigid(fl, s)) return none;
     if (never_pulls(fl, s) && stop->stiffness * delta < -stop->dashpot * speed) return none;
@@ -191,6 +198,12 @@ static bool is_number_of(const Flow *fl, int c, int s)
     int64_t column = fl->parameters[2 * c], index = fl->parameters[2 * c + 1];
     if (index >= -1) return index == s;
     return (int64_t)stop_of(fl, s)->area == -2 - index && is_slider(fl, s) == (column == FRICTION);
+}
+
+/* whether column c of the parameters is a stop's own number */
+static bool is_parameter(const Flow *fl, int c, int64_t column, int stop)
+{
+    return fl->parameters[2 * c] == column && is_number_of(fl, c, stop);
 }
 
 /* change of a stop's number in a column with column c of the parameters, which is that number of

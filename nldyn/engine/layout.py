@@ -46,6 +46,9 @@ class StopRow(NamedTuple):
     surface: float = 0.0  # speed in that sense of the surface on that of the other side
     area: float = -1.0  # number of the area of contact that it is a point of, or -1
     share: float = 1.0  # what of that it stands for: change of its stiffness with the area's
+    tangential: float = 0.0  # of a slider behind a spring: its stiffness
+    place: float = -1.0  # entry of the state that is the slider's own place, or -1
+    place_rate: float = 0.0  # rate of that entry where it sticks
 
 
 FIRST_POWER = len(

@@ -106,6 +106,24 @@ static int shoot(Call *call)
     return OK;
 }
 
+/* What sticks behind its spring all the time keeps the place that it has: it is taken out of the
+ * equations, with a multiplier of zero. */
+static void pin_places(Call *call)
+{
+    const Task *task = call->task;
+    const Flow *fl = &call->fl;
+    size_t size = fl->size, k = task->n_segments;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!is_sprung(fl, s)) continue;
+        size_t place = place_entry(fl, s);
+        bool free = true;
+        for (size_t i = 0; i < k && free; i++)
+            for (size_t j = 0; j < size; j++)
+                free = free && task->jacobians[(i * size + place) * size + j] == (j == place);
+        if (free) task->jacobians[((k - 1) * size + place) * size + place] = 0.0;
+    }
+}
+
 /* fill the linear equations of a step, column by column: those of the segments, and the plane */
 static void fill_equations(Call *call)
 {
@@ -235,6 +253,7 @@ static int correct(Call *call)
         int status = shoot(call);
         if (status != OK) return status;
         if (iteration == 1 && !closes_as_wanted(call)) return OTHER_CONTACTS;
+        pin_places(call);
         fill_equations(call);
         double opening = weighted_length(call, false), noise = closing_noise(call);
         lu_factor(call->matrix, n, call->order);
@@ -293,7 +312,7 @@ EXPORT int64_t nldyn_newton(const Host *host, const System *sys, const Gauss *ta
     M->with_columns = task->with_columns != 0;
     M->recording = task->recording != 0;
     M->closings = task->closings;
-    call.fastest = fastest_moved(sys);
+    call.fastest = fastest_strained(sys, fastest_moved(sys));
     task->told[0] = 1.0;
     task->told[1] = task->told[2] = INFINITY;
     begin_watch(&call.watch, host);

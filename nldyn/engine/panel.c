@@ -205,7 +205,7 @@ static void free_outputs(const Flow *fl, const Gauss *tab, int kind, double phas
 static int pressing_place(const Flow *fl, const Panel *panel, int a)
 {
     int s = panel->active[a];
-    return is_pressed(fl, s) && !is_held(fl, s) ? place_of(panel, (int)stop_of(fl, s)->normal) : -1;
+    return is_pressed(fl, s) && fl->slides[s] != 0 ? place_of(panel, (int)stop_of(fl, s)->normal) : -1;
 }
 
 /* force that presses a slider on, at node i of a panel */

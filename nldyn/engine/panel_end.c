@@ -135,6 +135,8 @@ static void add_node_columns(const Flow *fl, double node_phase, double t, const 
         if (!is_number_of(fl, c, stop) || column < GAP) continue;
         if (is_slider(fl, stop)) { /* what is held does not go with its friction */
             double way = friction_at(fl, stop, panel->output[(na + o) * m + i]).value;
+            if (column == TANGENTIAL && is_strained(fl, stop))
+                forces[fl->size + c] += panel->output[o * m + i];
             if (column == PRESSING) forces[fl->size + c] += way;
             if (column == FRICTION)
                 forces[fl->size + c] += fl->slides[stop] * normal_at(fl, panel, stop, i);

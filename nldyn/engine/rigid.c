@@ -50,12 +50,13 @@ static void contact_forces(const Motion *M, double phase)
         Course at = output_now(fl, s, M->w, phase);
         rates[s] = at.second;
         forces[s] = M->closed[s] ? force_now(fl, s, M->w, phase) : 0.0;
-        if (M->closed[s] && is_pressed(fl, s)) /* it comes after what presses it on */
+        if (M->closed[s] && is_pressed(fl, s) && !is_strained(fl, s)) /* after what presses it on */
             forces[s] = sliding_law(fl, s, at.first, forces[(int)stop_of(fl, s)->normal]).force;
     }
     for (int b = 0; b < n; b++)
         if (forces[b] != 0.0)
             for (int s = 0; s < n; s++) rates[s] -= between(fl, s, b) * forces[b];
+    fill_drags(M, phase);
     int count = held_stops(M, true);
     if (count == 0) return;
     const int *stops = M->s->resting;
@@ -79,6 +80,7 @@ static void state_rate(const Motion *M)
         const double *push = push_of(fl, s);
         double force = M->s->stop_forces[s];
         for (int k = 0; k < fl->size; k++) rate[k] -= push[k] * force;
+        if (is_sprung(fl, s)) rate[place_entry(fl, s)] += M->s->drags[s];
     }
 }
 
@@ -115,12 +117,6 @@ static void leave_parting(const Motion *M, double phase, bool *still)
     for (int s = 0; s < M->fl->n_stops; s++)
         if (still[s])
             still[s] = output_now(M->fl, s, M->w, phase).first >= -SHUT * rate_noise(M->fl, s, M->w);
-}
-
-/* whether column c of the parameters is a stop's own number */
-static bool is_parameter(const Flow *fl, int c, int64_t column, int stop)
-{
-    return fl->parameters[2 * c] == column && is_number_of(fl, c, stop);
 }
 
 /* fill `shift` (n_columns,): change of the instant at which a gap closes */
@@ -231,7 +227,7 @@ static void hand_over_sliders(const Motion *M)
 {
     const Flow *fl = M->fl;
     for (int s = 0; s < fl->n_stops; s++) {
-        if (!is_slider(fl, s)) continue;
+        if (!is_slider(fl, s) || is_sprung(fl, s)) continue;
         bool acts = !is_pressed(fl, s) || M->closed[(int)stop_of(fl, s)->normal];
         for (int r = 0; r < fl->n_stops && acts; r++) {
             if (!(is_rigid(fl, r) && M->closed[r])) continue;
@@ -249,7 +245,7 @@ static void loosen_sliders(const Motion *M, double phase, double roundings)
 {
     const Flow *fl = M->fl;
     for (int s = 0; s < fl->n_stops; s++) {
-        if (!(M->closed[s] && is_slider(fl, s)) || fl->slides[s] != 0) continue;
+        if (!(M->closed[s] && is_slider(fl, s) && is_held(fl, s))) continue;
         double speed = output_now(fl, s, M->w, phase).first - stop_of(fl, s)->belt;
         double most = roundings * (rate_noise(fl, s, M->w) + SUM_ROUNDING * fabs(stop_of(fl, s)->belt));
         if (fabs(speed) <= most) continue;
@@ -261,7 +257,7 @@ static void loosen_sliders(const Motion *M, double phase, double roundings)
 static bool any_sticks(const Motion *M)
 {
     for (int s = 0; s < M->fl->n_stops; s++)
-        if (M->closed[s] && is_slider(M->fl, s) && M->fl->slides[s] == 0) return true;
+        if (M->closed[s] && is_slider(M->fl, s) && is_held(M->fl, s)) return true;
     return false;
 }
 
@@ -276,7 +272,7 @@ static void slip_overloaded(const Motion *M, double phase)
         contact_forces(M, phase);
         const double *forces = M->s->stop_forces;
         for (int s = 0; s < fl->n_stops; s++) {
-            if (!(M->closed[s] && is_slider(fl, s)) || fl->slides[s] != 0) continue;
+            if (!(M->closed[s] && is_slider(fl, s) && is_held(fl, s))) continue;
             double normal = is_pressed(fl, s) ? forces[(int)stop_of(fl, s)->normal]
                                               : stop_of(fl, s)->pressing;
             double load = fabs(forces[s]) / (grip(fl, s) * larger(normal, 0.0));
@@ -307,6 +303,10 @@ static void slide_or_stick(Motion *M, int s, double phase, double t)
     double *shift = M->s->moved_shift;
     contact_forces(M, phase);
     M->panel->na = -1;
+    if (is_sprung(fl, s) && fl->slides[s] != 0) { /* no force jumps */
+        fl->slides[s] = 0;
+        return;
+    }
     if (fl->slides[s] == 0) {
         fl->slides[s] = M->s->stop_forces[s] > 0.0 ? 1 : -1;
         return;
@@ -428,11 +428,12 @@ static void impact(Motion *M, int first, bool crossed, double phase, double t)
         M->closings[hit]++;
     }
     for (int s = 0; s < fl->n_stops; s++) /* an impact may turn any of them */
-        if (is_slider(fl, s)) fl->slides[s] = 0;
+        if (is_slider(fl, s) && !is_sprung(fl, s)) fl->slides[s] = 0;
     M->panel->na = -1;
     loosen_sliders(M, phase, SHUT);
     settle(M, first, phase, t, shift, SHUT, struck);
     slip_overloaded(M, phase);
+    load_springs(M, phase, t, SHUT, 0.0, -1);
     for (int s = 0; s < fl->n_stops; s++) {
         if (!(struck[s] && M->closed[s] && M->bounces[s] > 0)) continue;
         M->closings[s] -= M->bounces[s] - 1;

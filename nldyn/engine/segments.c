@@ -49,6 +49,7 @@ static void switch_stop(Motion *M, int stop, double phase, double t)
     if (M->closed[stop]) {
         loosen_sliders(M, phase, SHUT);
         slip_overloaded(M, phase);
+        press_on(M, stop, phase, t);
     }
     if (M->with_columns && force_jumps(M, stop, phase))
         jump_columns(M, stop, phase, t, M->closed[stop]);
@@ -107,6 +108,8 @@ static void pass_event(Motion *M, int event, double h)
         if (M->closed[event]) M->closings[event]++;
     }
     switch_with(M, here, M->t, h);
+    contact_forces(M, here);
+    load_springs(M, here, M->t, SHUT, 10.0 * coarsest_instant(M->fl) * h, event);
 }
 
 /* fly to the first contact or to the end */
@@ -128,6 +131,7 @@ static int fly(Motion *M, double here)
     fly_state(fl->blocks, fl->n, M->w, first);
     if (M->with_columns) fly_columns(fl->blocks, fl->n, M->columns, M->n_columns, first);
     M->t = stop < 0 ? M->duration : M->t + first;
+    drag_places(M, M->phase + fl->omega * M->t, M->t);
     skip(M, 0.0);
     if (stop >= 0) pass_event(M, stop, 0.0);
     return GOES_ON;
@@ -202,6 +206,7 @@ static int take_panel(Motion *M, double here, const Trial *trial)
         M->depth[panel->active[a]] = panel->end_depth[a];
         M->doubt[panel->active[a]] = panel->end_doubt[a];
     }
+    drag_places(M, M->phase + fl->omega * M->t, M->t);
     return GOES_ON;
 }
 
@@ -305,6 +310,8 @@ static void begin_contacts(Motion *M)
         M->closed[s] = at.value - stop_of(fl, s)->gap > left;
     }
     loosen_sliders(M, M->phase, AT_START);
+    drag_places(M, M->phase, 0.0);
+    load_springs(M, M->phase, 0.0, AT_START, 0.0, -1);
 }
 
 /* fill w and its sensitivities from the state z (2n,) at the start of a segment */
@@ -324,6 +331,7 @@ static void begin_state(Motion *M, const double *start)
             row[size + c] = -product(by[(size_t)(2 + c) * size + i], turn).re;
     }
     add_growth(fl, M->phase, -1.0, M->w, M->columns, M->n_columns);
+    begin_places(M);
 }
 
 /* what comes of a segment: the state (2n,) at its end, and its derivatives with respect to the

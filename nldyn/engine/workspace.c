@@ -124,6 +124,7 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     s->pushes = numbers(block, na);
     s->first_pushes = numbers(block, na);
     s->held = numbers(block, na);
+    s->drags = numbers(block, na);
     s->mobility = numbers(block, na * na);
     s->resting = indices(block, na);
     s->mobility_order = indices(block, na);
@@ -131,6 +132,7 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     s->moved = numbers(block, n_columns);
     s->moved_shift = numbers(block, n_columns);
     s->along = numbers(block, size);
+    s->along_columns = numbers(block, n_columns);
     s->offsets = numbers(block, na * (1 + n_columns));
     s->struck = flags(block, na);
     s->still = flags(block, na);

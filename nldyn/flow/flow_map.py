@@ -273,7 +273,10 @@ class FlowMap:
             if not stop.pulls:
                 slowing = stop.dashpot / stop.stiffness
                 rows.append(rows[i] + slowing * s.linear.times_block(rows[i]))
-        return np.array(rows).reshape(len(rows), 2 * s.size)
+        for place, (number, size) in enumerate(zip(s.sprung, s.place_sizes, strict=True), s.size):
+            row = rows[len(s.stops) + number]  # the strain of the spring before the slider
+            rows[len(s.stops) + number] = row - size * np.eye(s.state_size)[2 * place]
+        return np.array(rows).reshape(len(rows), s.state_size)
 
     @cached_property
     def _pushed(self) -> list[Real]:
@@ -290,7 +293,7 @@ class FlowMap:
     def force_columns(self) -> Real:
         """What the forces of `_pushed` do to the rates of z, (2n, n_forces)."""
         columns = [self.system.force_column(v) for v in self._pushed]
-        return np.ascontiguousarray(np.array(columns).reshape(-1, 2 * self.system.size).T)
+        return np.ascontiguousarray(np.array(columns).reshape(-1, self.system.state_size).T)
 
     def ride(self, output: int, omega: float) -> Ride:
         """What a moving base adds to an output at ω, see `System.with_absolute`."""
@@ -380,9 +383,12 @@ class FlowMap:
             stop_row(stop, float(v @ v), self.options, releases)
             for stop, v in zip(s.stops, vectors, strict=False)
         ]
+        places = {number: 2 * (s.size + i) for i, number in enumerate(s.sprung)}
         stops += [
-            slider_row(slider, float(v @ v), self.options)
-            for slider, v in zip(s.sliders, vectors[len(s.stops) :], strict=False)
+            slider_row(slider, float(v @ v), self.options, places.get(number, -1))
+            for (number, slider), v in zip(
+                enumerate(s.sliders), vectors[len(s.stops) :], strict=False
+            )
         ]
         stops = of_areas(s, stops)
         first_bond = len(stops)
@@ -404,7 +410,7 @@ class FlowMap:
             bounds,
             self.force_columns,
             np.ones(1),
-            np.zeros((1, 3, 2 * s.size), dtype=complex),
+            np.zeros((1, 3, s.state_size), dtype=complex),
             np.hstack([np.array(stops, dtype=float).reshape(-1, len(StopRow._fields)), powers]),
             np.array([law_address(e.law) for e in s.stops] + [0] * unlawful, dtype=np.int64),
             self._bounds.tail,
@@ -514,7 +520,7 @@ class FlowMap:
         ends = phases.tolist() if phases.ndim == 1 else []
         if len(ends) < 2 or not all(map(operator.lt, ends, ends[1:])):
             raise SystemModelError("phases must be two or more ascending numbers")
-        size = 2 * self.system.size
+        size = self.system.state_size
         rows = 1 if chained else phases.size - 1
         if nodes.ndim != 2 or nodes.shape[1] != size or len(nodes) < rows:
             raise SystemModelError(
@@ -587,7 +593,7 @@ class FlowMap:
             If the arrays do not fit the segments.
         """
         guess = np.ascontiguousarray(guess, dtype=float)
-        unknowns = 2 * self.system.size * (phases.size - 1) + 1
+        unknowns = self.system.state_size * (phases.size - 1) + 1
         row, aim = corrector.row, corrector.aim
         if not guess.shape == row.shape == aim.shape == (unknowns,):  # or the kernel leaves memory
             raise SystemModelError(
@@ -647,7 +653,7 @@ class FlowMap:
         )
         found = newton(
             self._packed, self._packed_tables, record, recording, omega, point, phases, chained,
-            sensitivities, table, drive_by, corrector or _NONE, 2 * self.system.size,
+            sensitivities, table, drive_by, corrector or _NONE, self.system.state_size,
             len(self._pushed),
         )  # fmt: skip
         if len(self._pushed) > len(self.system.stops):  # what comes after the stops never closes
@@ -691,24 +697,58 @@ class FlowMap:
 
     def to_modal(self, states: Real) -> Real:
         """Modal displacements and velocities (..., 2n) of states z."""
-        return np.asarray(self._coordinates("states", states) @ self.system.linear.right.T)
+        states = _columns("states", states, self.system.state_size)
+        return np.asarray(states @ self.system.linear.right.T)
+
+    def to_start(self, states: Real) -> Real:
+        """The same, and the places in m of the sliders behind springs: all that goes on."""
+        return np.concatenate([self.to_modal(states), self.places(states)], axis=-1)
+
+    def places(self, states: Real) -> Real:
+        """Places in m of the sliders behind springs, `System.sprung`, at states z."""
+        states = _columns("states", states, self.system.state_size)
+        return np.asarray(states[..., 2 * self.system.size :: 2] * self.system.place_sizes)
 
     def to_state(self, modal: Real) -> Real:
-        """States z of modal displacements and velocities (..., 2n)."""
-        return np.asarray(self._coordinates("modal", modal) @ self.system.linear.left.T)
+        """States z of modal displacements and velocities (..., 2n).
 
-    def _coordinates(self, name: str, values: Real) -> Real:
-        values = _floats(name, values)
-        if values.ndim == 0 or values.shape[-1] != 2 * self.system.size:
-            raise SystemModelError(
-                f"{name} must have {2 * self.system.size} columns, got an array {values.shape}"
-            )
-        return values
+        Sliders behind springs are at rest in the middle, unless their places follow as in
+        `to_start`.
+        """
+        size, more = 2 * self.system.size, len(self.system.sprung)
+        placed = more and np.shape(modal)[-1:] == (size + more,)
+        modal = _columns("modal", modal, size + more if placed else size)
+        states = np.asarray(modal[..., :size] @ self.system.linear.left.T)
+        if placed:
+            states[..., size::2] = modal[..., size:] / self.system.place_sizes
+        return states
 
     def _record(self, capacity: int) -> Record:
         return empty_record(
-            capacity, 2 * self.system.size, len(self._pushed), self.tables.nodes.size
+            capacity, self.system.state_size, len(self._pushed), self.tables.nodes.size
         )
+
+
+def pinned(system: System, jacobians: Real) -> Real:
+    """Jacobians (k, N, N) of all segments of an orbit, without places that never move.
+
+    What sticks behind its spring all the time may have its place anywhere within its friction: the
+    one that it has is given, and its multiplier zero.
+    """
+    found = np.asarray(jacobians)
+    for place in range(2 * system.size, system.state_size, 2):
+        still = np.eye(system.state_size)[place]
+        if np.array_equal(found[:, place], np.tile(still, (len(found), 1))):
+            found = found.copy()
+            found[-1, place] = 0.0
+    return found
+
+
+def _columns(name: str, values: Real, count: int) -> Real:
+    values = _floats(name, values)
+    if values.ndim == 0 or values.shape[-1] != count:
+        raise SystemModelError(f"{name} must have {count} columns, got an array {values.shape}")
+    return values
 
 
 def _remember(pieces: Record, record: Record) -> None:
@@ -801,7 +841,7 @@ class Trajectory:
         flow = self.flow
         return sample_states(
             flow._packed, flow._packed_tables, self._packed, self.omega, phases,
-            2 * flow.system.size,
+            flow.system.state_size,
         )  # fmt: skip
 
     def _solved_in_contact(self, phases: Real) -> tuple[NDArray[np.intp], Real]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -32,6 +33,11 @@ from nldyn.system.system import System
 _NO_STOP = StopRow(0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0)  # what has no elastic contact
 _COLUMNS = {name: StopRow._fields.index(name) for name in OF_STOPS}
 _EXCITATION = -1
+_OF_SLIDERS = {
+    "friction": "friction",
+    "normal_force": "pressing",
+    "tangential_stiffness": "tangential",
+}
 
 
 def stop_row(
@@ -98,10 +104,10 @@ def bond_row(bond: Bond, mobility: float) -> StopRow:
     return _NO_STOP._replace(mobility=mobility, bond=1.0, drag=bond.drag, cubic=bond.cubic)
 
 
-def slider_row(slider: Slider, mobility: float, options: FlowOptions) -> StopRow:
-    """Numbers of a slider as the engine takes them."""
+def slider_row(slider: Slider, mobility: float, options: FlowOptions, place: int) -> StopRow:
+    """Numbers of a slider as the engine takes them; its place in the state if it has a spring."""
     friction = slider.friction
-    return _NO_STOP._replace(
+    row = _NO_STOP._replace(
         mobility=mobility,
         instant=options.instant(0.0),
         friction=friction.coefficient,
@@ -110,6 +116,14 @@ def slider_row(slider: Slider, mobility: float, options: FlowOptions) -> StopRow
         belt=friction.base_speed,
         normal=float(slider.stop),
         pressing=slider.normal_force,
+    )
+    if slider.tangential_stiffness is None:
+        return row
+    return row._replace(
+        tangential=slider.tangential_stiffness,
+        place=float(place),
+        place_rate=friction.base_speed / math.sqrt(mobility),
+        belt=0.0,  # the place goes with it
     )
 
 
@@ -142,7 +156,7 @@ def parameter_tables(
             of = second if name == "second_eccentricity" else index
             table[row] = StopRow._fields.index(column), of
         elif name in OF_SLIDERS:
-            column = {"friction": "friction", "normal_force": "pressing"}[name]
+            column = _OF_SLIDERS[name]
             table[row] = StopRow._fields.index(column), len(system.stops) + index
         elif name in OF_SPRINGS:
             spring = system.springs[index]

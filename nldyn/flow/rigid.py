@@ -185,6 +185,10 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
         return forces
     turns = np.exp(1j * phases[:, None] * data.orders)
     rates = (turns @ (np.array([1.0, omega, omega * omega]) @ data.drive)).real
+    if system.sprung:  # modal states do not tell the places of what is behind springs
+        order = np.argsort(phases, kind="stable")
+        states = states.copy()
+        states[order] = motion.states(phases[order])
     modal = flow.to_modal(states)
     for i, stop in system.elastic_stops.items():
         pushed = stop.force(*system.depth_and_speed(stop, modal))
@@ -197,11 +201,17 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
     holds = np.zeros((len(phases), len(system.sliders)), dtype=bool)
     for i, slider in enumerate(system.sliders, first):
         friction = rec.force[piece, i]
-        acts, sticks = friction.any(axis=1), held_in_pieces(motion, i)[piece]
+        acts, sticks = friction.any(axis=1), held_in_pieces(motion, i - first)[piece]
         holds[:, i - first] = acts & sticks
-        speed = states @ flow.rate_rows[i] - slider.friction.base_speed
-        slid = np.where(sticks, 0.0, np.sign(friction.sum(axis=1)) * slider.friction.at(speed))
-        rates -= (slid * _normal_force(flow, slider, states))[:, None] * data.force[:, i]
+        normal = _normal_force(flow, slider, states)
+        if slider.tangential_stiffness is not None:
+            most = slider.friction.coefficient * normal
+            pulled = np.clip(slider.tangential_stiffness * (states @ flow.rows[i]), -most, most)
+        else:
+            speed = states @ flow.rate_rows[i] - slider.friction.base_speed
+            law = np.sign(friction.sum(axis=1)) * slider.friction.at(speed)
+            pulled = np.where(sticks, 0.0, law) * normal
+        rates -= pulled[:, None] * data.force[:, i]
     for i, bond in enumerate(system.bonds, first + len(system.sliders)):
         pulled = bond.force(states @ flow.rows[i], states @ flow.rate_rows[i])
         rates -= pulled[:, None] * data.force[:, i]

@@ -106,9 +106,12 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
         panels = panels[rec.depth[panels, slider.stop].any(axis=1)]
     duration, place = rec.duration[panels], ends @ flow.rows[output]
     force, inner = rec.force[panels, output], rec.depth[panels, output]
+    if slider.tangential_stiffness is not None:  # what slides is not what the spring is fixed to
+        place = flow.places(ends)[:, flow.system.sprung.index(number)]
+        inner = place[panels, None] + inner - force / slider.tangential_stiffness
     ways = np.diff(place)[panels] - slider.friction.base_speed * duration
     size = np.abs(place).max() + np.abs(slider.friction.base_speed * duration).max(initial=0.0)
-    held = held_in_pieces(motion, output)[panels]
+    held = held_in_pieces(motion, number)[panels]
     slides = np.abs(ways) > np.where(held, UNMOVED, ROUNDING) * size
     along = np.column_stack([place[panels], inner, place[panels + 1]])[slides]
     lengths = tables.weights[rec.kind[panels[slides]]] * duration[slides, None]
@@ -131,12 +134,15 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
     )
 
 
-def held_in_pieces(motion: Trajectory, output: int) -> NDArray[np.bool_]:
-    """Whether the slider of an output does not slide in the pieces of a motion, (pieces,).
+def held_in_pieces(motion: Trajectory, number: int) -> NDArray[np.bool_]:
+    """Whether a slider does not slide in the pieces of a motion, (pieces,), and has no spring.
 
     Where one is held its output is no displacement but the acceleration that the force takes away.
     """
     flow, rec = motion.flow, motion.record
+    output = len(flow.system.stops) + number
+    if number in flow.system.sprung:
+        return np.zeros(rec.phase.size, dtype=bool)
     mobility = float(flow.rate_rows[output] @ flow.force_columns[:, output])
     inner = rec.depth[:, output]
     off = np.abs(inner - mobility * rec.force[:, output]).max(axis=1)

@@ -505,7 +505,7 @@ def _read_exploration(
     )
     steps, branches, notes = (group.whole(name) for name in ("steps", "branches", "notes"))
     given = group.whole("given") if group.has_attribute("given") else 0
-    carried = group.array("carried", -1, 2 * question.flow.system.size)
+    carried = group.array("carried", -1, question.flow.system.state_size)
     coverage = _read_coverage(group.group("coverage"))
     ends = tuple(group.array("ends", -1, kind=np.int64).tolist())
     met = group.array("met", -1, branches, kind=np.int64) > 0

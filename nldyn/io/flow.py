@@ -110,12 +110,23 @@ def _told_friction(system: System) -> dict[str, Any]:
     """Dry friction by the places of its stops and dampers."""
     return {
         "stops": {
-            place: [stop.tangent, stop.tangent_against, astuple(stop.friction)]
+            place: [
+                stop.tangent,
+                stop.tangent_against,
+                astuple(stop.friction),
+                stop.tangential_stiffness,
+            ]
             for place, stop in enumerate(system.stops)
             if isinstance(stop, Stop) and isinstance(stop.friction, Friction)
         },
         "dampers": {
-            place: [damper.at, damper.normal_force, astuple(damper.friction), damper.against]
+            place: [
+                damper.at,
+                damper.normal_force,
+                astuple(damper.friction),
+                damper.against,
+                damper.tangential_stiffness,
+            ]
             for place, damper in enumerate(system.dampers)
             if isinstance(damper, DryFriction) and isinstance(damper.friction, Friction)
         },
@@ -201,11 +212,12 @@ def _with_friction(
     rough, all_dampers = list(stops), list(dampers)
     try:
         told = json.loads(group.text("friction"))
-        for place, (tangent, against, law) in told["stops"].items():
+        for place, (tangent, against, law, *spring) in told["stops"].items():
             own = {"tangent": tangent, "tangent_against": against, "friction": Friction(*law)}
+            own["tangential_stiffness"] = spring[0] if spring else None  # or of an earlier version
             rough[int(place)] = replace(rough[int(place)], **own)
-        for place, (at, normal, law, against) in told["dampers"].items():
-            all_dampers.insert(int(place), DryFriction(at, normal, Friction(*law), against))
+        for place, (at, normal, law, *ends) in told["dampers"].items():
+            all_dampers.insert(int(place), DryFriction(at, normal, Friction(*law), *ends))
     except (ValueError, TypeError, KeyError, AttributeError, IndexError):
         raise group.fault("attribute", "friction", "does not tell what slides") from None
     return tuple(rough), tuple(all_dampers)
@@ -413,13 +425,14 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
         if str(error).startswith(str(group.path)):
             raise
         raise SystemModelError(f"{group.path}: {error}") from error
-    basis = group.group("basis")
+    basis, places = group.group("basis"), len(system.sprung)
     vars(system)["linear"] = LinearPart(
-        basis.array("blocks", n, 2, 2),
-        basis.array("right", 2 * n, 2 * n),
-        basis.array("left", 2 * n, 2 * n),
-        basis.array("growth", n),
+        basis.array("blocks", n + places, 2, 2),
+        basis.array("right", 2 * n, system.state_size),
+        basis.array("left", system.state_size, 2 * n),
+        basis.array("growth", n + places),
         basis.number("condition"),
+        places,
     )
     nodes = group.whole("nodes") if group.has_attribute("nodes") else None
     tail = group.number("tail") if group.has_attribute("tail") else None

@@ -281,7 +281,7 @@ class Attractor:
         """The motion on the attractor, recorded over some excitation periods."""
         check_whole("periods", periods, 1, MOST_RECORDED)
         if periods not in self._cache:
-            start = self.flow.to_modal(self.states[-1])
+            start = self.flow.to_start(self.states[-1])
             self._cache[periods] = simulate(self.flow, self.frequency_hz, periods, start=start)
         return self._cache[periods]
 

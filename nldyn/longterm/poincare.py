@@ -287,7 +287,7 @@ def _columns(
     """Columns of one sweep, or from random states."""
     direction, values = task
     columns = []
-    state = np.zeros(2 * flow.system.size)
+    state = np.zeros(flow.system.state_size)
     for value in values:
         here = axis.at(flow, value)
         if direction == "random":

@@ -127,7 +127,7 @@ class Motion:
             raise SystemModelError(f"time must be a list of times, got shape {time.shape}")
         order = np.argsort(time, kind="stable")
         where = self._stretch_at(time[order])
-        states = np.empty((time.size, 2 * self.system.size))
+        states = np.empty((time.size, self.system.state_size))
         for k in np.unique(where):
             within = order[where == k]
             stretch = self.stretches[k]
@@ -154,8 +154,11 @@ class Motion:
 
     @property
     def end(self) -> Real:
-        """Modal displacements and velocities (2n,) at the end: where to go on."""
-        return np.asarray(self.flow.to_modal(end_state(self.stretches[-1])))
+        """Modal displacements and velocities (2n,) at the end: where to go on.
+
+        Then come the places in m of sliders behind springs.
+        """
+        return np.asarray(self.flow.to_start(end_state(self.stretches[-1])))
 
     @property
     def end_phase_deg(self) -> float:
@@ -473,9 +476,9 @@ def starting_state(flow: FlowMap, start: Real | None) -> Real:
     """State z (2n,) of a modal one that a user gave; undeformed and still for none."""
     size = 2 * flow.system.size
     if start is None:
-        return np.zeros(size)
+        return np.zeros(flow.system.state_size)
     modal = numbers("start", start)
-    if modal.shape != (size,):
+    if modal.shape not in ((size,), (size + len(flow.system.sprung),)):
         raise SystemModelError(
             f"start must have {size} entries, displacements and velocities of "
             f"{flow.system.size} modes, got shape {modal.shape}"

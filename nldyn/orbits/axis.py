@@ -254,17 +254,17 @@ class Section:
     def to_base(self, states: Real) -> Real:
         """States (..., 2n) in the coordinates of the base."""
         here, base = self.flow.system.linear, self.base.system.linear
-        return states if here is base else np.asarray(states @ (base.left @ here.right).T)
+        return states if here is base else np.asarray(states @ base.coordinates_of(here).T)
 
     def states_of(self, orbit: Orbit) -> Real:
         """States (n, 2n_modes) of an orbit at another value, at the start of each period."""
         here, there = self.flow.system.linear, orbit.system.linear
         states = stroboscopic(orbit)
-        return states if here is there else np.asarray(states @ (here.left @ there.right).T)
+        return states if here is there else np.asarray(states @ here.coordinates_of(there).T)
 
     def taken_over(self, states: Real) -> Real:
         """States (k, 2n) of the base as motions here may begin: not behind rigid stops."""
         here, base = self.flow.system.linear, self.base.system.linear
         if here is not base:
-            states = states @ (here.left @ base.right).T
+            states = states @ here.coordinates_of(base).T
         return states if self.flow is self.base else before_rigid_stops(self.flow, states)

@@ -19,7 +19,7 @@ from scipy.linalg import solve_triangular
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES, ConvergenceError, SystemModelError
-from nldyn.flow.flow_map import FlowMap, Segments, Solution, Trajectory
+from nldyn.flow.flow_map import FlowMap, Segments, Solution, Trajectory, pinned
 from nldyn.flow.options import FlowOptions
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.passage import Passage, shoot_past
@@ -191,7 +191,7 @@ class OrbitFamily:
             nodes = np.array(carried)
         here, start = orbit.system.linear, self.system.linear
         if here is not start:  # an orbit of the family has coordinates of its own
-            nodes = nodes @ (start.left @ here.right).T
+            nodes = nodes @ start.coordinates_of(here).T
         if self.in_frequency_alone and here is start:
             return orbit.point
         point = np.zeros(self.n_states + self.n_free)
@@ -303,7 +303,7 @@ class Evaluation:
         here, start = self.problem.flow.system.linear, self.family.system.linear
         if here is start:
             return None
-        return here.left @ start.right, start.left @ here.right
+        return here.coordinates_of(start), start.coordinates_of(here)
 
     @cached_property
     def nodes(self) -> Real:
@@ -343,7 +343,7 @@ class Evaluation:
     @property
     def blocks(self) -> Real:
         """Jacobians (k, 2n, 2n) of the segments, in the coordinates of the family's system."""
-        blocks = self.segments.jacobians
+        blocks = pinned(self.problem.flow.system, self.segments.jacobians)
         return blocks if self.change is None else self.change[1] @ blocks @ self.change[0]
 
     def by_parameter(self, which: int) -> Real:
@@ -362,7 +362,7 @@ class Evaluation:
     def jacobian(self) -> Real:
         """Derivatives of R, shape (N, N + m)."""
         family, blocks = self.family, self.blocks
-        n, k, size = family.n_states, family.segments, 2 * family.system.size
+        n, k, size = family.n_states, family.segments, family.system.state_size
         matrix = np.zeros((n, n + family.n_free))
         for j in range(k):
             rows = slice(j * size, (j + 1) * size)
@@ -402,7 +402,7 @@ class Evaluation:
         """The orbit with an estimate of its relative error."""
         if self.family.start:
             return self._at_phase_zero().make_orbit(error)
-        return self.orbit_by(self.segments.jacobians, error)
+        return self.orbit_by(pinned(self.problem.flow.system, self.segments.jacobians), error)
 
     def orbit_by(self, jacobians: Real, error: float) -> Orbit:
         """The orbit with Jacobians (k, 2n, 2n) that are known."""

@@ -27,9 +27,10 @@ NO_PLACE = (
 def guessed_nodes(problem: ShootingProblem, guess: Real, omega: float) -> Real:
     """States (k, 2n) at the shooting phases from a guess, checked."""
     guess = np.atleast_2d(numbers("guess", guess))
-    if guess.shape not in ((1, problem.size), (problem.segments, problem.size)):
+    size = 2 * problem.flow.system.size
+    if guess.shape not in ((1, size), (problem.segments, size)):
         raise SystemModelError(
-            f"guess must have {problem.size} entries (or {problem.segments} such rows), "
+            f"guess must have {size} entries (or {problem.segments} such rows), "
             f"got shape {guess.shape}"
         )
     if guess.shape[0] == problem.segments:

@@ -555,7 +555,7 @@ class Orbit:
             raise SystemModelError(f"phases must be a list of phases, got shape {phases.shape}")
         within = phases % (2.0 * np.pi * self.period)
         order = np.argsort(within, kind="stable")
-        states = np.empty((phases.size, 2 * self.system.size))
+        states = np.empty((phases.size, self.system.state_size))
         states[order] = self.trajectory.states(within[order])
         return self.problem.flow.to_modal(states)
 

@@ -15,7 +15,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_whole
 from nldyn.engine.newton import Corrector
-from nldyn.flow.flow_map import FlowMap, Solution, Trajectory
+from nldyn.flow.flow_map import FlowMap, Solution, Trajectory, pinned
 
 SEGMENTS_PER_PERIOD = 2
 LONGEST_PERIOD = 10**4  # excitation periods of an orbit
@@ -59,8 +59,8 @@ class ShootingProblem:
 
     @property
     def size(self) -> int:
-        """Number of real coordinates of a state, 2n."""
-        return 2 * self.flow.system.size
+        """Number of real coordinates of a state z."""
+        return self.flow.system.state_size
 
     def nodes(self, point: Real) -> Real:
         """States (k, 2n) of a point."""
@@ -91,7 +91,7 @@ class ShootingProblem:
             if found.failure:
                 return None
             pieces.append(found.jacobians)
-        return np.concatenate(pieces)
+        return pinned(self.flow.system, np.concatenate(pieces))
 
     def correct(
         self,

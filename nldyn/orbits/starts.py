@@ -116,7 +116,7 @@ def simulate_strobe(
 
 def random_states(flow: FlowMap, omega: float, count: int, seed: int | Sequence[int]) -> Real:
     """Initial states (count, 2n): rest, then random ones, see `simulate_strobe`."""
-    n = 2 * flow.system.size
+    n = flow.system.state_size
     rng = np.random.default_rng(seed)
     size = max(response_size(flow.system, omega), reach(flow.system))
     states = np.empty((count, n))

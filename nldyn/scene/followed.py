@@ -22,7 +22,7 @@ OF_LISTS = {  # the keys of each list of tables that may change
     "stops": OF_STOPS,
     "excitation": SOURCES,
     "dampers": ("coefficient",),
-    "friction": ("coefficient", "normal_force"),
+    "friction": ("coefficient", "normal_force", "tangential_stiffness"),
     "round_clearances": (*SHARED, "clearance", "friction", "eccentricity"),
     "contact_areas": ("gap", "stiffness", "friction"),
     "springs": ("stiffness", "coefficients"),
@@ -92,7 +92,10 @@ def _of_element(scene: Scene, kind: str, number: int, key: list[str]) -> Paramet
         raise _refused(scene, f"names '{name}', but only that of a linear damper may change")
     if kind == "friction":
         if getattr(table, key[0]) is None:
-            raise _refused(scene, f"names '{name}', but a stop presses that on")
+            why = "no spring is before that"
+            if key[0] == "normal_force":
+                why = "a stop presses that on"
+            raise _refused(scene, f"names '{name}', but {why}")
         return Parameter(
             "friction" if key[0] == "coefficient" else key[0], slider_of(scene, number)
         )

@@ -596,6 +596,9 @@ class FrictionTable(Table):
     """[m/s] Speed along the surface of what it slides on: of a belt or a rotor."""
     against: str | None = None
     """Interface at the other side; the ground unless given."""
+    tangential_stiffness: Positive | None = None
+    """[N/m] Stiffness of a spring along the surface before what slides, above 0: Jenkins' element.
+    Several tables at one interface are an Iwan chain. Without it nothing gives way."""
 
     @model_validator(mode="after")
     def _two_ends(self) -> FrictionTable:
@@ -605,6 +608,8 @@ class FrictionTable(Table):
             raise ValueError("needs an 'at_rest' of at least 'coefficient'")
         if (self.at_rest or 0.0) > self.coefficient and self.fading_speed is None:
             raise ValueError("has an 'at_rest' above 'coefficient', which needs a 'fading_speed'")
+        if (self.at_rest or 0.0) > self.coefficient and self.tangential_stiffness is not None:
+            raise ValueError("has a 'tangential_stiffness', before which 'at_rest' is no other one")
         return self
 
 

@@ -82,7 +82,8 @@ def _law_of_friction(table: FrictionTable) -> Friction:
 
 def _dry(table: FrictionTable) -> DryFriction:
     assert table.normal_force is not None
-    return DryFriction(table.at, table.normal_force, _law_of_friction(table), table.against)
+    law, spring = _law_of_friction(table), table.tangential_stiffness
+    return DryFriction(table.at, table.normal_force, law, table.against, spring)
 
 
 def _rough(scene: Scene, stops: list[AnyStop]) -> tuple[AnyStop, ...]:
@@ -101,8 +102,9 @@ def _rough(scene: Scene, stops: list[AnyStop]) -> tuple[AnyStop, ...]:
             raise scene_error(scene.file, ("friction", number, "stop"), fault)
         law = _law_of_friction(table)
         stops[table.stop] = replace(
-            stop, tangent=table.at, friction=law, tangent_against=table.against
-        )
+            stop, tangent=table.at, friction=law, tangent_against=table.against,
+            tangential_stiffness=table.tangential_stiffness,
+        )  # fmt: skip
     return tuple(stops)
 
 

@@ -513,7 +513,7 @@ def shortened(
     seconds = time.process_time() - begun
     if before.failure or probe.failure:
         return effort
-    each = probe.record.phase.size * (2.0 * flow.system.size) ** 2
+    each = probe.record.phase.size * float(flow.system.state_size) ** 2
 
     def flown(effort: OrbitSearchOptions) -> int:
         """Periods of simulation and of Newton's method."""

@@ -246,7 +246,7 @@ class _Survey:
     def __init__(self, box: Collector, question: Question, known: Diagram) -> None:
         self.box, self.question, self.known = box, question, known
         self.max_period, self.effort = question.max_period, question.effort
-        nothing = np.empty((0, 2 * question.flow.system.size))
+        nothing = np.empty((0, question.flow.system.state_size))
         given = len(known.branches)
         met = np.zeros((0, given), dtype=bool)
         self.stage = Stage(0, given, len(known.notes), nothing, (), met, (), given)
@@ -326,7 +326,7 @@ class _Survey:
             stage.steps + 1,
             len(box.branches),
             len(box.notes),
-            here.to_base(np.array(carried).reshape(-1, 2 * box.flow.system.size)),
+            here.to_base(np.array(carried).reshape(-1, box.flow.system.state_size)),
             tuple(both[value] for value in sorted(both)),
             met,
             (*stage.ends, len(box.branches)) if last else stage.ends,

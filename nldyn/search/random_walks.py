@@ -118,7 +118,7 @@ def _known_states(here: Section, branches: Sequence[Branch], rng: np.random.Gene
     reaching = [branch for branch in branches if distance_from(branch, here) <= WINDOW]
     orbits = [orbit for branch in reaching for orbit in orbits_near(branch, here)]
     known = [here.states_of(orbit) for orbit in orbits]
-    return np.vstack([np.empty((0, 2 * flow.system.size)), *runs, *known])
+    return np.vstack([np.empty((0, flow.system.state_size)), *runs, *known])
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,6 +68,7 @@ UNITS = {
     "force": "N",
     "friction": "1",
     "normal_force": "N",
+    "tangential_stiffness": "N/m",
     "coefficient": "N s/m",
     "spring_stiffness": "N/m",
     "modal_damping": "1",
@@ -96,6 +97,7 @@ POSITIVE = (
     "stiffness",
     "area_stiffness",
     "normal_force",
+    "tangential_stiffness",
     "natural_frequency_hz",
 )  # there is no system where they are zero
 NAMES = (FREQUENCY, *OF_ELEMENTS, *_OF_MODES, SPIN, SPEED)

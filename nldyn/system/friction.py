@@ -95,6 +95,18 @@ def as_friction(owner: str, given: Friction | float) -> Friction:
     return given if isinstance(given, Friction) else Friction(given)
 
 
+def check_spring(owner: str, stiffness: float | None, law: Friction) -> None:
+    """Refuse a tangential stiffness that is none, or before a coefficient that changes."""
+    if stiffness is None:
+        return
+    check_positive(owner, "tangential_stiffness", stiffness)
+    if law.adhesion:
+        raise SystemModelError(
+            f"{owner}: behind a tangential_stiffness friction has one coefficient, at rest and "
+            "sliding: leave out at_rest and fading_speed, or the tangential_stiffness"
+        )
+
+
 @dataclass(frozen=True)
 class DryFriction:
     r"""Dry friction that acts all the time: :math:`F = \mu(v)\,N\,\mathrm{sign}\,v`, exactly.
@@ -112,28 +124,41 @@ class DryFriction:
         The law, or a coefficient μ.
     against : str, optional
         Interface that it slides on; the ground unless given.
+    tangential_stiffness : float, optional
+        k_t in N/m of a spring between the interface and the slider: Jenkins' element. Where it
+        sticks, the force is k_t times the strain of the spring, where it slides, μ N. Several at
+        one interface are an Iwan chain. Without it nothing gives way.
 
     Raises
     ------
     SystemModelError
-        For a value out of range, or one interface at both ends.
+        For a value out of range, one interface at both ends, or a coefficient that changes with
+        the speed behind a spring.
+
+    References
+    ----------
+    G. M. Jenkins (1962), *Brit. J. Appl. Phys.* 13, 225-229; W. D. Iwan (1966), *J. Appl. Mech.*
+    33, 893-900.
 
     Examples
     --------
     >>> DryFriction("block", 10.0, 0.3).friction.coefficient
     0.3
+    >>> chain = [DryFriction("joint", 1.0, share, tangential_stiffness=1e3) for share in (0.1, 0.2)]
     """
 
     at: str
     normal_force: float
     friction: Friction | float
     against: str | None = None
+    tangential_stiffness: float | None = None
 
     def __post_init__(self) -> None:
         check_ends("dry friction", self.at, self.against)
         owner = f"dry friction at '{self.at}'"
         check_positive(owner, "normal_force", self.normal_force)
         object.__setattr__(self, "friction", as_friction(owner, self.friction))
+        check_spring(owner, self.tangential_stiffness, self.law)
 
     @property
     def law(self) -> Friction:
@@ -154,6 +179,8 @@ class Slider:
         Number of the stop whose force presses it on, or -1.
     normal_force : float
         Force in N that does so in place of a stop's.
+    tangential_stiffness : float, optional
+        Stiffness in N/m of the spring before it.
     """
 
     at: str
@@ -161,3 +188,4 @@ class Slider:
     friction: Friction
     stop: int = -1
     normal_force: float = 0.0
+    tangential_stiffness: float | None = None

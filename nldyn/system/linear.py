@@ -82,6 +82,9 @@ class LinearPart:
         Upper bounds of the norm of exp(A_b t) over t >= 0 (infinite for a free rigid body).
     condition : float
         Condition number of the basis in energy coordinates.
+    places : int
+        How many of the blocks, the last, are no pairs of the modes but places that stay where they
+        are, with a rate that is given: `right` has more columns by two of each, `left` rows.
     """
 
     blocks: Real
@@ -89,11 +92,39 @@ class LinearPart:
     left: Real
     growth: Real
     condition: float
+    places: int = 0
 
     @property
     def frequencies_hz(self) -> Real:
         """Frequencies of the pairs without their damping, sqrt(det A_b)/2π, ascending, (n,)."""
-        return np.sort(np.sqrt(np.abs(np.linalg.det(self.blocks)))) / (2.0 * np.pi)
+        return np.sort(np.sqrt(np.abs(np.linalg.det(self._pairs)))) / (2.0 * np.pi)
+
+    @property
+    def _pairs(self) -> Real:
+        """The blocks of the modes, (n, 2, 2)."""
+        return self.blocks[: len(self.blocks) - self.places]
+
+    def with_places(self, count: int) -> LinearPart:
+        """The same with places beside the modes."""
+        if not count:
+            return self
+        still = np.tile([[0.0, 1.0], [0.0, 0.0]], (count, 1, 1))
+        none = np.zeros((len(self.right), 2 * count))
+        return replace(
+            self,
+            blocks=np.concatenate([self.blocks, still]),
+            right=np.hstack([self.right, none]),
+            left=np.vstack([self.left, none.T]),
+            growth=np.append(self.growth, np.ones(count)),
+            places=count,
+        )
+
+    def coordinates_of(self, other: LinearPart) -> Real:
+        """Matrix from the coordinates of another linear part to those here; places are kept."""
+        change = self.left @ other.right
+        for kept in range(2 * (len(self.blocks) - self.places), len(change)):
+            change[kept, kept] = 1.0
+        return change
 
     def of_modes(self, modes: Real) -> LinearPart:
         """The same for states of displacements ``modes @ q``, with orthogonal modes (n, n)."""
@@ -107,7 +138,7 @@ class LinearPart:
     @property
     def slowest_decay(self) -> float:
         """Rate in 1/s of the free motion that decays last; not positive if one does not decay."""
-        return -float(np.linalg.eigvals(self.blocks).real.max())
+        return -float(np.linalg.eigvals(self._pairs).real.max())
 
     def times_block(self, rows: Real) -> Real:
         """Rows (..., 2n) times the block-diagonal matrix A."""

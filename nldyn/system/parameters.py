@@ -15,7 +15,11 @@ OF_STOPS = ("gap", "stiffness", "exponent", "dissipation", "dashpot", "restituti
 OF_ROUND = ("clearance", "rubbing_friction", "first_eccentricity", "second_eccentricity")
 SHARED = ("stiffness", "exponent", "dissipation")
 OF_SPRINGS = tuple(f"k{power}" for power in range(1, LARGEST_DEGREE + 1))
-OF_SLIDERS = {"friction": "coefficient", "normal_force": "normal_force"}  # and what it is there
+OF_SLIDERS = {  # and what it is there
+    "friction": "coefficient",
+    "normal_force": "normal_force",
+    "tangential_stiffness": "tangential_stiffness",
+}
 OF_AREAS = {  # and which number of their stops it is
     "area_gap": "gap",
     "area_stiffness": "stiffness",
@@ -48,7 +52,8 @@ class Parameter:
         law of its own, but for the gap); clearance, rubbing_friction (the coefficient),
         first_eccentricity or second_eccentricity of a round clearance; amplitude,
         mass_times_radius or force of an excitation; k1, k2, ..., the coefficients of a polynomial
-        spring; friction (the coefficient) and normal_force of a slider; area_gap (the smallest),
+        spring; friction (the coefficient), normal_force and
+        tangential_stiffness of a slider; area_gap (the smallest),
         area_stiffness (per m² or m) and area_friction of an area of contact.
     index : int
         Which of the stops, excitations, springs, sliders (`System.sliders`), areas
@@ -137,6 +142,11 @@ def check_exact(system: System, parameter: Parameter) -> None:
         if name == "normal_force" and system.sliders[index].stop >= 0:
             raise SystemModelError(
                 f"parameter '{name}': a stop presses slider {index} on, no constant force"
+            )
+        if name == "tangential_stiffness" and index not in system.sprung:
+            raise SystemModelError(
+                f"parameter '{name}': slider {index} has no spring before it: give its friction a "
+                "tangential_stiffness"
             )
     else:
         known = ", ".join([*OF_STOPS, *OF_AREAS, *OF_ROUND, *SOURCES, *OF_SPRINGS, *OF_SLIDERS])

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from nldyn.base.arrays import TINY, Real
 from nldyn.base.errors import SystemModelError, check_types, shown
 from nldyn.system.contact_law import ContactLaw, check_law, power_law
-from nldyn.system.friction import Friction, as_friction
+from nldyn.system.friction import Friction, as_friction, check_spring
 from nldyn.system.values import check_finite, check_not_negative, check_positive, check_sides
 
 LARGEST_EXPONENT = 4.0
@@ -266,6 +266,9 @@ class Stop:
         Name of the area of contact that it is a point of, see `contact_area`.
     share : float
         What of that area it stands for: its weight in m² or m, or 1 node by node.
+    tangential_stiffness : float, optional
+        k_t in N/m of a spring along the surface, before the friction: where that sticks, the spring
+        gives way. Without it nothing does.
 
     Raises
     ------
@@ -293,6 +296,7 @@ class Stop:
     tangent_against: str | None = None
     area: str | None = None
     share: float = 1.0
+    tangential_stiffness: float | None = None
     impulsive: ClassVar[bool] = False  # whether velocities jump where it is hit
 
     def __post_init__(self) -> None:
@@ -328,7 +332,8 @@ class Stop:
     def _check_friction(self, owner: str) -> None:
         ends = {"tangent": self.tangent, "tangent_against": self.tangent_against}
         check_types(**{f"{owner}: {name}": (end, str, None) for name, end in ends.items()})
-        if self.friction is None and self.tangent is None and self.tangent_against is None:
+        given = (self.friction, self.tangent, self.tangent_against, self.tangential_stiffness)
+        if all(one is None for one in given):
             return
         if self.friction is None or self.tangent is None:
             raise SystemModelError(f"{owner}: friction needs both friction and tangent")
@@ -339,7 +344,11 @@ class Stop:
                 f"{owner}: friction needs a force that never pulls: no dissipation, no law of your "
                 "own, and a dashpot only with pulls = False"
             )
-        object.__setattr__(self, "friction", as_friction(owner, self.friction))
+        if self.dashpot and self.tangential_stiffness is not None:
+            raise SystemModelError(f"{owner}: give either a dashpot or a tangential_stiffness")
+        law = as_friction(owner, self.friction)
+        object.__setattr__(self, "friction", law)
+        check_spring(owner, self.tangential_stiffness, law)
 
     @property
     def law_of_friction(self) -> Friction:

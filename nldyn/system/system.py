@@ -385,6 +385,11 @@ class System:
         return int(self.natural_frequencies.size)
 
     @property
+    def state_size(self) -> int:
+        """Number of coordinates of a state z: 2n, and two of each slider behind a spring."""
+        return 2 * (self.size + len(self.sprung))
+
+    @property
     def frequencies_hz(self) -> Real:
         """Modal frequencies in Hz, shape (n,), of the structure without its springs.
 
@@ -433,12 +438,35 @@ class System:
     def sliders(self) -> tuple[Slider, ...]:
         """What slides by dry friction: at the stops, then all the time."""
         at_stops = [
-            Slider(stop.tangent, stop.tangent_against, stop.friction, number)
+            Slider(
+                stop.tangent,
+                stop.tangent_against,
+                stop.friction,
+                number,
+                tangential_stiffness=stop.tangential_stiffness,
+            )
             for number, stop in self.elastic_stops.items()
             if isinstance(stop.friction, Friction) and stop.tangent is not None
         ]
         dry = [d for d in self.dampers if isinstance(d, DryFriction)]
-        return (*at_stops, *(Slider(d.at, d.against, d.law, -1, d.normal_force) for d in dry))
+        return (
+            *at_stops,
+            *(
+                Slider(d.at, d.against, d.law, -1, d.normal_force, d.tangential_stiffness)
+                for d in dry
+            ),
+        )
+
+    @cached_property
+    def sprung(self) -> tuple[int, ...]:
+        """Numbers of the sliders behind springs, whose places are coordinates of the state."""
+        return tuple(i for i, s in enumerate(self.sliders) if s.tangential_stiffness is not None)
+
+    @cached_property
+    def place_sizes(self) -> Real:
+        """Displacements of these sliders at unit coordinates of their places, in m."""
+        sprung = [self.sliders[number] for number in self.sprung]
+        return np.array([np.linalg.norm(self.vector_between(s.at, s.against)) for s in sprung])
 
     @property
     def loses_by_speed(self) -> bool:
@@ -586,7 +614,8 @@ class System:
             slope = abs(bond.coefficients[0]) if bond.coefficients else 0.0
             squares += slope * (c if modes is None else modes.T @ c) ** 2
         part = linear_part(omega, D, np.sqrt(squares), cross)
-        return part if modes is None else part.of_modes(modes)
+        part = part if modes is None else part.of_modes(modes)
+        return part.with_places(len(self.sprung))
 
     def vector_between(self, at: str, against: str | None) -> Real:
         """Modal vector of the displacement at an interface, less that at another one, (n,)."""
@@ -624,11 +653,11 @@ class System:
         return self.participation[name] if name in self.participation else self.loads[name]
 
     def displacement_row(self, phi: Real) -> Real:
-        """Row that gives the displacement ``phi @ q = row @ z``, shape (2n,)."""
+        """Row that gives the displacement ``phi @ q = row @ z``, of the length of z."""
         return np.asarray(phi @ self.linear.right[: self.size])
 
     def force_column(self, phi: Real) -> Real:
-        """Column by which a unit force on ``phi`` drives z, shape (2n,)."""
+        """Column by which a unit force on ``phi`` drives z, of its length."""
         return np.asarray(self.linear.left[:, self.size :] @ phi)
 
     @cached_property
@@ -690,7 +719,7 @@ class System:
 
     def drive_of(self, excitation: Sequence[Excitation]) -> Complex:
         """The drive by some sources whose harmonics the system has, as `drive`."""
-        drive = np.zeros((self.orders.size, 3, 2 * self.size), dtype=complex)
+        drive = np.zeros((self.orders.size, 3, self.state_size), dtype=complex)
         for source in excitation:
             row = int(np.flatnonzero(self.orders == source.harmonic)[0])
             column = self.force_column(self.load_vector(source.at))
@@ -854,18 +883,22 @@ class System:
                         raise SystemModelError(told_apart(table, number, at, against))
 
     def with_slider(self, number: int, name: str, value: float) -> System:
-        """The system with another `coefficient` or `normal_force` of one of its `sliders`."""
+        """The system with another number of one of its `sliders`.
+
+        That is its `coefficient`, `normal_force` or `tangential_stiffness`.
+        """
         slider = self.sliders[number]
-        friction = slider.friction.with_coefficient(value) if name == "coefficient" else None
+        change: dict[str, Any] = {name: value}
+        if name == "coefficient":
+            change = {"friction": slider.friction.with_coefficient(value)}
         if slider.stop >= 0:
             stops = list(self.stops)
             pressing = stops[slider.stop]
             assert isinstance(pressing, Stop)
-            stops[slider.stop] = replace(pressing, friction=friction)
+            stops[slider.stop] = replace(pressing, **change)
             return self.with_elements(stops=tuple(stops))
         dry = [i for i, damper in enumerate(self.dampers) if isinstance(damper, DryFriction)]
         place = dry[number - len(self.sliders)]  # they are the last of the sliders
-        change = {"friction": friction} if friction else {name: value}
         dampers = list(self.dampers)
         dampers[place] = replace(dampers[place], **change)
         return self.with_elements(dampers=tuple(dampers))
@@ -893,6 +926,12 @@ class System:
 
     def _check_sliders(self) -> None:
         """Refuse sliders that hold one motion together: what each holds would not be told."""
+        for slider in (self.sliders[number] for number in self.sprung):
+            if not np.any(self.vector_between(slider.at, slider.against)):
+                raise SystemModelError(
+                    f"friction at '{slider.at}' acts on no motion: none of the {self.size} modes "
+                    "moves there"
+                )
         for together in self._sliders_at_once() if self.sliders else ():
             rows = [self.vector_between(s.at, s.against) for s in together]
             if _rank(rows, self.size) < len(rows):
@@ -904,12 +943,16 @@ class System:
                 )
 
     def _sliders_at_once(self) -> Iterator[list[Slider]]:
-        """Sliders that may stick at once: of stops to both sides of a gap, those of one side."""
+        """Sliders that may stick at once: of stops to both sides of a gap, those of one side.
+
+        Those behind springs are left out: what each holds goes with its strain.
+        """
         sides: dict[tuple[str, str | None], set[int]] = {}
-        pressed = [(slider, self.stops[slider.stop]) for slider in self.sliders if slider.stop >= 0]
+        hard = [slider for slider in self.sliders if slider.tangential_stiffness is None]
+        pressed = [(slider, self.stops[slider.stop]) for slider in hard if slider.stop >= 0]
         for _, stop in pressed:
             sides.setdefault((stop.at, stop.against), set()).add(stop.direction)
-        dry = [slider for slider in self.sliders if slider.stop < 0]
+        dry = [slider for slider in hard if slider.stop < 0]
         for chosen in itertools.islice(itertools.product(*sides.values()), MOST_SIDES):
             side = dict(zip(sides, chosen, strict=True))
             yield dry + [

@@ -2,6 +2,7 @@
 
 import pytest
 
+from nldyn.app.describe import describe_slider
 from nldyn.base.errors import SceneError
 from nldyn.scene.build import build_system
 from nldyn.scene.followed import followed_parameter
@@ -65,9 +66,26 @@ def test_tables_become_friction_of_stops_and_dampers_and_their_coefficients_may_
     assert value_of(system, 0.2, followed_parameter(scene)) == 0.3
 
 
+def test_a_spring_before_friction_may_change(tmp_path):
+    spring = AT_STOP.replace("at_rest = 0.4\nfading_speed = 0.1", "tangential_stiffness = 7.0")
+    text = SCENE.replace("friction.1.coefficient", "friction.1.tangential_stiffness")
+    path = tmp_path / "scene.toml"
+    path.write_text(text.format(other=spring))
+    scene = load_scene(path)
+    system = build_system(scene)
+    assert system.stops[0].tangential_stiffness == 7.0
+    assert value_of(system, 0.2, followed_parameter(scene)) == 7.0
+    assert "behind 7 N/m, pressed on by stop 0" in describe_slider(system.sliders[0])
+    path.write_text(text.format(other=AT_STOP))
+    with pytest.raises(SceneError, match="no spring is before that"):
+        followed_parameter(load_scene(path))
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
+        ({"base_speed = 0.2": "tangential_stiffness = 7.0"}, "before which 'at_rest'"),
+        ({"base_speed = 0.2": "tangential_stiffness = 0.0"}, "tangential_stiffness"),
         ({"stop = 0": ""}, "needs one of 'normal_force' and 'stop'"),
         ({"stop = 0": "stop = 0\nnormal_force = 1.0"}, "has both 'normal_force' and 'stop'"),
         ({"stop = 0": "stop = 1"}, "is rigid"),

@@ -1,0 +1,222 @@
+/* Sliders behind a spring of tangential stiffness [Jenkins 1962]: where one sticks, its force goes
+ * with the strain of the spring, the output of its row; where it slides, that is its friction over
+ * the stiffness. The place of the slider is an entry of the state, so that the strain is a row of
+ * it like any other; as it slides, or nothing presses it on, the place follows at once. */
+#include "engine.h"
+
+static int place_entry(const Flow *fl, int s) { return (int)stop_of(fl, s)->place; }
+
+/* strain by that entry */
+static double strain_by_place(const Flow *fl, int s) { return row_of(fl, 0, s)[place_entry(fl, s)]; }
+
+/* force that presses a slider on, with its derivative by the penetration of the stop that does */
+static Value pressing_now(const Flow *fl, int s, const double *w, double phase)
+{
+    if (!is_pressed(fl, s)) return (Value){stop_of(fl, s)->pressing, 0.0};
+    int stop = (int)stop_of(fl, s)->normal;
+    Course at = depth_now(fl, stop, w, phase);
+    Force f = law(fl, stop, at.value, at.first);
+    return (Value){f.force, f.stiffness};
+}
+
+/* Speed at which a slider moves along what it slides on, to one `way`: of what it holds or, behind
+ * a spring, less the rate of the strain, that of its friction over the stiffness. */
+static double drag_speed(const Flow *fl, int s, int way, const double *w, double phase)
+{
+    const Stop *slider = stop_of(fl, s);
+    double speed = output_now(fl, s, w, phase).first - slider->belt;
+    if (!is_sprung(fl, s) || !is_pressed(fl, s) || way == 0) return speed;
+    double pace = depth_now(fl, (int)slider->normal, w, phase).first;
+    double growth = pressing_now(fl, s, w, phase).slope * pace;
+    return speed - way * grip(fl, s) * growth / slider->tangential;
+}
+
+/* rounding error of it */
+static double drag_noise(const Flow *fl, int s, const double *w, double phase)
+{
+    const Stop *slider = stop_of(fl, s);
+    double noise = rate_noise(fl, s, w);
+    if (!is_sprung(fl, s) || !is_pressed(fl, s)) return noise;
+    int stop = (int)slider->normal;
+    Course at = depth_now(fl, stop, w, phase);
+    double slope = pressing_now(fl, s, w, phase).slope, sway = rate_noise(fl, stop, w);
+    if (at.value > 0.0)
+        sway += stop_of(fl, stop)->exponent * fabs(at.first) / at.value * output_noise(fl, stop, w);
+    return noise + grip(fl, s) * slope * sway / slider->tangential;
+}
+
+/* the share of that rate at node i of a panel, in the sense of sliding */
+static double grip_pace(const Flow *fl, const Panel *panel, int s, int i)
+{
+    if (!is_sprung(fl, s) || !is_pressed(fl, s)) return 0.0;
+    int m = panel->m, a = place_of(panel, (int)stop_of(fl, s)->normal);
+    double growth = panel->slope[a * m + i] * panel->output[(panel->na + a) * m + i];
+    return grip(fl, s) * growth / stop_of(fl, s)->tangential;
+}
+
+/* fill s->drags (n_stops,): rates of the places of sliders that slide or that nothing presses on,
+ * beside those at which they stick */
+static void fill_drags(const Motion *M, double phase)
+{
+    const Flow *fl = M->fl;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!is_sprung(fl, s)) continue;
+        bool sticks = M->closed[s] && fl->slides[s] == 0;
+        int way = M->closed[s] ? fl->slides[s] : 0;
+        double speed = sticks ? 0.0 : drag_speed(fl, s, way, M->w, phase);
+        M->s->drags[s] = -speed / strain_by_place(fl, s);
+    }
+}
+
+/* rounding error of the margin between the force of a spring and the friction that holds it */
+static double strain_noise(const Flow *fl, int s, const double *w)
+{
+    const Stop *slider = stop_of(fl, s);
+    return slider->tangential * output_noise(fl, s, w);
+}
+
+/* whether a slider that sticks is about to slip, to within a time allowed or rounding */
+static bool at_grip(const Flow *fl, int s, const double *w, double phase, double allowed)
+{
+    const Stop *slider = stop_of(fl, s);
+    Course strain = output_now(fl, s, w, phase);
+    double most = grip(fl, s) * pressing_now(fl, s, w, phase).value;
+    double margin = most - fabs(slider->tangential * strain.value);
+    double pace = slider->tangential * fabs(strain.first);
+    if (is_pressed(fl, s)) {
+        double growth = pressing_now(fl, s, w, phase).slope;
+        pace += grip(fl, s) * growth * fabs(depth_now(fl, (int)slider->normal, w, phase).first);
+    }
+    return margin <= allowed * pace + 10.0 * strain_noise(fl, s, w);
+}
+
+/* whether a slider has no friction, so that nothing tells which way it slides */
+static bool slides_freely(const Flow *fl, int s) { return is_sprung(fl, s) && grip(fl, s) == 0.0; }
+
+/* add to a row of sensitivities (n_columns,) `factor` times what presses a slider on changes by */
+static void add_pressing_columns(const Motion *M, int s, double factor, double phase, double t,
+                                 double *sums)
+{
+    const Flow *fl = M->fl;
+    int stop = (int)stop_of(fl, s)->normal;
+    for (int c = 0; c < fl->n_parameters && !is_pressed(fl, s); c++)
+        if (is_parameter(fl, c, PRESSING, s)) sums[fl->size + c] += factor;
+    if (!is_pressed(fl, s)) return;
+    double *depth = M->s->moved, slope = pressing_now(fl, s, M->w, phase).slope;
+    Course at = depth_now(fl, stop, M->w, phase);
+    output_columns(fl, stop, 0, phase, t, M->columns, M->n_columns, depth);
+    for (int c = 0; c < M->n_columns; c++) sums[c] += factor * slope * depth[c];
+    for (int c = 0; c < fl->n_parameters && at.value > 0.0; c++)
+        if (is_number_of(fl, c, stop) && fl->parameters[2 * c] >= GAP)
+            sums[fl->size + c] += factor * share_in(fl, c, stop) *
+                                  law_by(fl, stop, fl->parameters[2 * c], at.value, at.first);
+}
+
+/* Put the place of a slider where its spring has a strain of `way` times its friction over the
+ * stiffness, with its sensitivities, at a time t after the start. */
+static void drag_place(Motion *M, int s, int way, double phase, double t)
+{
+    const Flow *fl = M->fl;
+    const Stop *slider = stop_of(fl, s);
+    double by = strain_by_place(fl, s), share = way * grip(fl, s) / slider->tangential;
+    double normal = way == 0 ? 0.0 : pressing_now(fl, s, M->w, phase).value;
+    double *off = M->s->along_columns;
+    if (M->with_columns) {
+        output_columns(fl, s, 0, phase, t, M->columns, M->n_columns, off);
+        for (int c = 0; c < M->n_columns; c++) off[c] = -off[c];
+        if (way != 0) add_pressing_columns(M, s, share, phase, t, off);
+        for (int c = 0; c < fl->n_parameters && way != 0; c++) {
+            if (is_parameter(fl, c, FRICTION, s))
+                off[fl->size + c] += way * normal / slider->tangential;
+            if (is_parameter(fl, c, TANGENTIAL, s))
+                off[fl->size + c] -= share * normal / slider->tangential;
+        }
+        double *row = M->columns + (size_t)place_entry(fl, s) * M->n_columns;
+        for (int c = 0; c < M->n_columns; c++) row[c] += off[c] / by;
+    }
+    M->w[place_entry(fl, s)] += (share * normal - output_now(fl, s, M->w, phase).value) / by;
+    M->depth[s] = share * normal;
+    M->doubt[s] = 0.0;
+}
+
+/* the same of all sliders behind springs that slide, or that nothing presses on */
+static void drag_places(Motion *M, double phase, double t)
+{
+    const Flow *fl = M->fl;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!is_sprung(fl, s) || (M->closed[s] && fl->slides[s] == 0)) continue;
+        drag_place(M, s, M->closed[s] ? fl->slides[s] : 0, phase, t);
+    }
+}
+
+/* Let the sliders behind springs slide whose friction is reached and that move on, and the others
+ * stick, but for one of which that is known, or what such a stop presses on; what is strained beyond its friction, as at the start
+ * of a guess, is let go so far. A speed of so many `roundings`, or gained in the time `allowed`, is
+ * none. */
+static void load_springs(Motion *M, double phase, double t, double roundings, double allowed,
+                         int known)
+{
+    const Flow *fl = M->fl;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!(is_sprung(fl, s) && M->closed[s]) || s == known) continue;
+        if (is_pressed(fl, s) && (int)stop_of(fl, s)->normal == known) continue;
+        Course strain = output_now(fl, s, M->w, phase);
+        double force = stop_of(fl, s)->tangential * strain.value;
+        double noise = 10.0 * strain_noise(fl, s, M->w);
+        double most = grip(fl, s) * larger(pressing_now(fl, s, M->w, phase).value, 0.0);
+        int way = force > 0.0 ? 1 : -1, before = fl->slides[s];
+        if (fabs(force) > most + noise) drag_place(M, s, way, phase, t);
+        if (smaller(most, fabs(force)) <= noise) way = strain.first > 0.0 ? 1 : -1;
+        double speed = way * drag_speed(fl, s, way, M->w, phase);
+        double none = roundings * drag_noise(fl, s, M->w, phase) + allowed * fabs(M->s->pushes[s]);
+        bool slides = (before != 0 || at_grip(fl, s, M->w, phase, allowed)) && speed > none;
+        fl->slides[s] = slides || slides_freely(fl, s) ? way : 0;
+        if (fl->slides[s] != before) M->panel->na = -1; /* its equations are others now */
+    }
+}
+
+/* Let the sliders stick or slide that a stop presses on which just closes: both forces grow from
+ * nothing. Up to that instant, which shifts, places have followed. */
+static void press_on(Motion *M, int stop, double phase, double t)
+{
+    const Flow *fl = M->fl;
+    double *shift = M->s->along_columns;
+    double pace = depth_now(fl, stop, M->w, phase).first;
+    for (int s = stop + 1; s < fl->n_stops; s++) {
+        if (!(is_sprung(fl, s) && is_pressed(fl, s) && (int)stop_of(fl, s)->normal == stop)) continue;
+        double speed = drag_speed(fl, s, 0, M->w, phase), growth = 0.0;
+        if (stop_of(fl, stop)->exponent == 1.0) growth = stop_of(fl, stop)->stiffness * pace;
+        bool slides = stop_of(fl, s)->tangential * fabs(speed) > grip(fl, s) * growth;
+        fl->slides[s] = !slides && !slides_freely(fl, s) ? 0 : speed > 0.0 ? 1 : -1;
+        if (!M->with_columns || fl->slides[s] != 0) continue;
+        output_columns(fl, stop, 0, phase, t, M->columns, M->n_columns, shift);
+        for (int c = 0; c < fl->n_parameters; c++)
+            if (is_parameter(fl, c, GAP, stop)) shift[fl->size + c] -= 1.0;
+        double rate = -speed / strain_by_place(fl, s);
+        double *row = M->columns + (size_t)place_entry(fl, s) * M->n_columns;
+        for (int c = 0; c < M->n_columns; c++) row[c] -= rate * shift[c] / pace;
+    }
+}
+
+/* let places move as what they lie on: that is no coordinate of the motion, but given */
+static void begin_places(Motion *M)
+{
+    const Flow *fl = M->fl;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!is_sprung(fl, s)) continue;
+        int entry = place_entry(fl, s) + 1;
+        M->w[entry] = stop_of(fl, s)->place_rate;
+        M->columns[(size_t)entry * M->n_columns + entry] = 0.0;
+    }
+}
+
+/* fastest rate of a system whose stops move blocks so fast, with springs of sliders */
+static double fastest_strained(const System *sys, double fastest)
+{
+    double square = squared(fastest);
+    for (int s = 0; s < sys->n_stops; s++) {
+        const Stop *slider = (const Stop *)(sys->stops + (size_t)s * sys->n_columns);
+        if (slider->place >= 0.0) square += slider->tangential * slider->mobility;
+    }
+    return sqrt(square);
+}
