@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from nldyn.system import Friction
 
 Vector = NDArray[np.float64]
-FIRST_STEP = 1e-7  # behind an event, which another one may follow at once
+FIRST_STEP = 1e-9  # behind an event, which another one may follow at once
 ROUNDED = 1.0 + 1e-12  # times its friction: what slips no more than a rounding before
 
 

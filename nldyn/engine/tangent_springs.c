@@ -16,7 +16,8 @@ static Value pressing_now(const Flow *fl, int s, const double *w, double phase)
     int stop = (int)stop_of(fl, s)->normal;
     Course at = depth_now(fl, stop, w, phase);
     Force f = law(fl, stop, at.value, at.first);
-    return (Value){f.force, f.stiffness};
+    bool touches = at.value <= 0.0 && stop_of(fl, stop)->exponent == 1.0; /* or it would be open */
+    return (Value){f.force, touches ? stop_of(fl, stop)->stiffness : f.stiffness};
 }
 
 /* Speed at which a slider moves along what it slides on, to one `way`: of what it holds or, behind
