@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.assembly.shell_errors import shell_errors
+from fem.assembly.shell_errors import shell_errors, smooth_corners
 from fem.assembly.shells import shell_pieces
 from fem.assembly.solid_errors import solid_errors
 from fem.base.arrays import FloatArray, IntArray
@@ -27,10 +27,12 @@ def part_errors(
     for name, solids in pieces.items():
         found[name] = solid_errors(model.mesh, solids, shapes), np.zeros(len(shapes))
     names = {id(part): name for name, (part, _) in model.shells.items()}
-    facets: dict[int, tuple[ShellPart, list[tuple[CellKind, IntArray, FloatArray]]]] = {}
-    for part, kind, nodes, normals in shell_pieces(model):
+    shells = list(shell_pieces(model))
+    corners = smooth_corners(model.mesh.points, [nodes for _, _, nodes, _ in shells])
+    facets: dict[int, tuple[ShellPart, list[tuple[CellKind, IntArray, FloatArray, IntArray]]]] = {}
+    for (part, kind, nodes, normals), own in zip(shells, corners, strict=True):
         if part.section is None:
-            facets.setdefault(id(part), (part, []))[1].append((kind, nodes, normals))
+            facets.setdefault(id(part), (part, []))[1].append((kind, nodes, normals, own))
     for key, (part, blocks) in facets.items():
         found[names[key]] = shell_errors(model.mesh.points, part, blocks, shapes)
     return found

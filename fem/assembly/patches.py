@@ -31,7 +31,7 @@ class Patches:
     Parameters
     ----------
     place
-        Which patch belongs to a node of the mesh, -1 where none, shape (n,).
+        Which patch belongs to a corner of the mesh by its number, -1 where none.
     centres, axes, size
         Of each, in m, shape (p, 3), (p, 3, 3) by rows, and (p,).
     thin
@@ -92,20 +92,22 @@ def patches_of(
     ----------
     points
         Of the mesh in m, shape (n, 3).
-    corners, nodes
-        Of the cells of each block, shape (e, c) and (e, b).
+    corners
+        Numbers of the corners of the cells of each block, shape (e, c): cells with the same one
+        share a patch.
+    nodes
+        Of the same cells, corners first, shape (e, b).
     thinness
         Tensors (e, 3, 3) whose greatest eigenvalues belong to the directions in which cells are
         thin, and grow with the inverse square of the thickness.
     """
     used = np.unique(np.concatenate([block.ravel() for block in corners]))
-    place = np.full(len(points), -1)
+    place = np.full(used[-1] + 1, -1)
     place[used] = np.arange(len(used))
     total = np.zeros((len(used), 13))
-    for block, tensor in zip(corners, thinness, strict=True):
-        own = np.column_stack(
-            [np.ones(len(block)), points[block].mean(axis=1), tensor.reshape(-1, 9)]
-        )
+    for block, own_nodes, tensor in zip(corners, nodes, thinness, strict=True):
+        middle = points[own_nodes[:, : block.shape[1]]].mean(axis=1)
+        own = np.column_stack([np.ones(len(block)), middle, tensor.reshape(-1, 9)])
         for column in block.T:
             total += _sums(place[column], own, len(used))
     centres = total[:, 1:4] / total[:, :1]

@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from fem.assembly.patches import Patches, fitted, patches_of
 from fem.base.arrays import FloatArray, IntArray
@@ -25,6 +27,8 @@ from fem.model.parts import ShellPart
 RIDGE = np.array([1e-9, 1e-4, 1e-4])
 SURE = 4
 """As for solids."""
+SMOOTH_DEGREES = 50.0
+"""Facets that meet at less than this angle bend as one surface: a ring of 8 still does."""
 MIDDLE = {"triangle": np.full((1, 2), 1.0 / 3.0), "quad": np.full((1, 2), 0.5)}
 
 
@@ -34,8 +38,8 @@ class Facets:
 
     Parameters
     ----------
-    kind, nodes, cells
-        What they are.
+    kind, nodes, corners, cells
+        What they are; corners as of `smooth_corners`.
     area
         At the places of integration in m², shape (e, q).
     own
@@ -46,6 +50,7 @@ class Facets:
 
     kind: CellKind
     nodes: IntArray
+    corners: IntArray
     cells: FlatCells
     area: FloatArray
     own: FloatArray
@@ -58,7 +63,7 @@ class Facets:
 def shell_errors(
     points: FloatArray,
     part: ShellPart,
-    blocks: Sequence[tuple[CellKind, IntArray, FloatArray]],
+    blocks: Sequence[tuple[CellKind, IntArray, FloatArray, IntArray]],
     shapes: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Twice the energy in J that is too much, and the kg m² that are too little, (m,) each.
@@ -70,7 +75,8 @@ def shell_errors(
     part
         The part, of one material.
     blocks
-        Kind, nodes (e, b) and normals (e, b, 3) of its facets, as of `shell_pieces`.
+        Kind, nodes (e, b) and normals (e, b, 3) of its facets, as of `shell_pieces`, and their
+        corners (e, b), as of `smooth_corners`.
     shapes
         Displacements and rotations of the nodes, shape (m, n, 6).
     """
@@ -78,7 +84,7 @@ def shell_errors(
     normals = [f.cells.axes[:, 2] for f in facets]
     nodes = [f.nodes for f in facets]
     thin = [normal[:, :, None] * normal[:, None] for normal in normals]
-    patches = patches_of(points, nodes, nodes, thin)
+    patches = patches_of(points, [f.corners for f in facets], nodes, thin)
     fits, trust = _fits(points, patches, facets)
     law = np.append(_split_law(part), [part.shearing, part.shearing])
     energy, mass = np.zeros(len(shapes)), np.zeros(len(shapes))
@@ -93,6 +99,52 @@ def shell_errors(
         lift = np.einsum("eqs,mes->meq", parabola, bent * [0.5, 0.5, 0.5])
         mass += part.mass * np.einsum("eq,meq->m", each.area, lift * (2.0 * each.deflection + lift))
     return energy, mass
+
+
+def smooth_corners(points: FloatArray, blocks: Sequence[IntArray]) -> list[IntArray]:
+    """Numbers of the corners of facets (e, b), the same where they meet in one smooth surface.
+
+    At a fold and along an edge of three facets or more, as that of a rib on a plate, curvatures
+    jump, and the facets of each side have corners of their own.
+
+    Examples
+    --------
+    Two facets in a plane and one that stands on their edge share no corner across it:
+
+    >>> x, y, z = [0, 1, 1, 0, 2, 2, 1, 1], [0, 0, 1, 1, 0, 1, 0, 1], [0, 0, 0, 0, 0, 0, 1, 1]
+    >>> points = np.array([x, y, z], dtype=float).T
+    >>> flat = np.array([[0, 1, 2, 3], [1, 4, 5, 2]])
+    >>> smooth_corners(points, [flat])[0]
+    array([[0, 1, 2, 3],
+           [1, 4, 5, 2]], dtype=int32)
+    >>> len(np.unique(smooth_corners(points, [np.vstack([flat, [1, 6, 7, 2]])])[0]))
+    12
+    """
+    if not blocks:
+        return []
+    first = np.cumsum([0, *(block.size for block in blocks)])
+    numbers = [
+        start + np.arange(block.size).reshape(block.shape)
+        for start, block in zip(first, blocks, strict=False)
+    ]
+    ends, normals = [], []
+    for block, own in zip(blocks, numbers, strict=True):
+        edge = np.stack([block, np.roll(block, -1, axis=1), own, np.roll(own, -1, axis=1)], axis=-1)
+        turn = edge[..., 0] > edge[..., 1]
+        edge[turn] = edge[turn][:, [1, 0, 3, 2]]
+        ends.append(edge.reshape(-1, 4))
+        normals.append(np.repeat(flat_cells(points[block]).axes[:, 2], block.shape[1], axis=0))
+    edges, normal = np.concatenate(ends), np.concatenate(normals)
+    order = np.lexsort(edges[:, :2].T)
+    edges, normal = edges[order], normal[order]
+    same = (edges[1:, :2] == edges[:-1, :2]).all(axis=1)
+    alone = ~np.append(same[1:], False) & ~np.insert(same[:-1], 0, False)
+    cosine = np.abs(np.einsum("pi,pi->p", normal[1:], normal[:-1]))
+    at = np.flatnonzero(same & alone & (cosine > np.cos(np.radians(SMOOTH_DEGREES))))
+    one, other = edges[at, 2:].ravel(), edges[at + 1, 2:].ravel()
+    joined = sparse.coo_array((np.ones(len(one)), (one, other)), shape=(first[-1], first[-1]))
+    label = connected_components(joined, directed=False)[1]
+    return [label[own] for own in numbers]
 
 
 def _split_law(part: ShellPart) -> FloatArray:
@@ -121,6 +173,7 @@ def _facets(
     kind: CellKind,
     nodes: IntArray,
     normals: FloatArray,
+    corners: IntArray,
     shapes: FloatArray,
 ) -> Facets:
     """Facets in some shapes; curvatures of triangles are their means."""
@@ -144,14 +197,14 @@ def _facets(
     )
     values, _ = kind.basis(places)
     along = np.einsum("mebi,ei->meb", shapes[:, nodes, :3], cells.axes[:, 2])
-    return Facets(kind, nodes, cells, area, own, along @ values.T)
+    return Facets(kind, nodes, corners, cells, area, own, along @ values.T)
 
 
 def _turns(
     patches: Patches, facets: Facets, column: int, places: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Terms (e, q, 3), turns (e, 2, 2) from the facets' planes to patches, and sides (e,)."""
-    corners = facets.nodes[:, column]
+    corners = facets.corners[:, column]
     at, _ = patches.coordinates(corners, places)
     middle = facets.cells
     _, axes = patches.coordinates(corners, places.mean(axis=1, keepdims=True))
@@ -194,7 +247,7 @@ def _fits(
         whole = each.area.sum(axis=1)
         mean = np.einsum("eq,meqr->mer", each.area, each.own) / whole[:, None]
         middle = points[each.nodes].mean(axis=1, keepdims=True)
-        for number, column in enumerate(each.nodes.T):
+        for number, column in enumerate(each.corners.T):
             terms, turn, side = _turns(patches, each, number, middle)
             seen = np.moveaxis(turned(mean[:, :, None], turn, side)[:, :, 0], 0, 1)
             weighted = terms.swapaxes(1, 2) * whole[:, None, None]
@@ -212,7 +265,7 @@ def _smooth(
     values, _ = facets.kind.basis(facets.kind.rule(ORDERS[facets.kind.name])[0])
     places = values @ points[facets.nodes]
     total, whole = np.zeros(facets.own.shape), np.zeros(facets.area.shape)
-    for number, column in enumerate(facets.nodes.T):
+    for number, column in enumerate(facets.corners.T):
         terms, turn, side = _turns(patches, facets, number, places)
         patch = patches.place[column]
         found = np.einsum("eqt,etmr->meqr", terms, fits[patch])
@@ -240,7 +293,7 @@ def _across(patches: Patches, facets: Facets, fits: FloatArray, parabola: FloatA
     slope = facets.kind.basis(middle)[1][0]
     gradient = slope @ np.linalg.inv(jacobians(facets.kind, facets.cells.plane, middle)[:, 0])
     second = np.zeros((len(facets.own), len(facets.nodes), 2, 5))
-    for number, column in enumerate(facets.nodes.T):
+    for number, column in enumerate(facets.corners.T):
         patch = patches.place[column]
         centres = patches.centres[patch][:, None]
         _, turn, side = _turns(patches, facets, number, centres)

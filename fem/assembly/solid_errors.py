@@ -17,6 +17,7 @@ import numpy as np
 from fem.assembly.patches import Patches, fitted, patches_of
 from fem.assembly.solids import unseen_rows
 from fem.base.arrays import FloatArray, IntArray
+from fem.elements.shells import unit
 from fem.elements.solids import gradients_and_volumes
 from fem.mesh.cells import KINDS, CellKind
 from fem.mesh.structure_mesh import StructureMesh
@@ -32,6 +33,10 @@ RIDGE = {
 """For `fitted`, by the order of cells: slopes are asked for before what is of higher order."""
 SURE = 4
 """Power of how well determined the fit of a patch is: its weight beside its neighbours'."""
+INNER = 1e-3
+"""Weight of patches at the edge of a notch beside that of others."""
+NOTCH_DEGREES = 230.0, 350.0
+"""Angles of the material around the edge of a notch: inside a ring of 8 it is less."""
 BATCH_BYTES = 5e7
 
 
@@ -56,10 +61,41 @@ def solid_errors(
                 right += patches.sums(column, weighted @ turned)
                 count += patches.sums(column, np.ones(len(column)))
     fits, known = fitted(normal, right, RIDGE[order])
+    trust = count * known**SURE
+    trust[patches.place[inner_corners(mesh.points, pieces)]] *= INNER
     found = np.zeros(len(shapes))
     for piece in pieces:
-        found += _off(piece, mesh, shapes, patches, fits, count * known**SURE)
+        found += _off(piece, mesh, shapes, patches, fits, trust)
     return found
+
+
+def inner_corners(points: FloatArray, pieces: Sequence[SolidCells]) -> IntArray:
+    """Nodes at the ends of edges into which solids have a notch, where strains are not smooth."""
+    keys, angles = [], []
+    for kind, nodes in ((piece.kind, piece.nodes) for piece in pieces):
+        for first, second, *beside in _edges(kind):
+            at, *ways = (points[nodes[:, node]] for node in (first, *beside))
+            along = unit(points[nodes[:, second]] - at) if second != first else 0.0 * at
+            across = [v - at - np.sum((v - at) * along, axis=1)[:, None] * along for v in ways]
+            cosine = np.sum(unit(across[0]) * unit(across[1]), axis=1)
+            angles.append(np.arccos(np.clip(cosine, -1.0, 1.0)))
+            low, high = np.sort(nodes[:, [first, second]], axis=1).T
+            keys.append(low * len(points) + high)
+    edges, which = np.unique(np.concatenate(keys), return_inverse=True)
+    whole = np.degrees(np.bincount(which, np.concatenate(angles)))
+    inner = edges[(whole > NOTCH_DEGREES[0]) & (whole < NOTCH_DEGREES[1])]
+    return np.unique(np.concatenate(np.divmod(inner, len(points))))
+
+
+def _edges(kind: CellKind) -> Iterator[tuple[int, ...]]:
+    """Ends of the edges of cells and the corners beside; in the plane those beside a corner."""
+    next_to = [
+        [b if a == n else a for a, b in kind.edges if n in (a, b)] for n in range(len(kind.corners))
+    ]
+    for first, second in (
+        [(n, n) for n in range(len(next_to))] if kind.dimension == 2 else kind.edges
+    ):
+        yield first, second, *[n for n in next_to[first] if n != second][:2]
 
 
 def _thinness(places: FloatArray, dimension: int) -> FloatArray:

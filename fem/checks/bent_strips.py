@@ -8,7 +8,7 @@ from fem.base.arrays import FloatArray, IntArray
 from fem.checks.bent import surface_through
 from fem.checks.columns import Columns
 from fem.checks.excess import settled, summed
-from fem.elements.shells import corner_normals, shell_rows
+from fem.elements.shells import FLAT, corner_normals, shell_rows
 from fem.mesh.cells import CellKind
 from fem.model.parts import ShellPart
 
@@ -19,7 +19,8 @@ def strip_excess(
     """Excess (f,) of stiffness in their plane of the facets (e, b) at free edges of strips.
 
     The right energy is that which they have when they are stretched evenly, times the square of
-    the distance from the middle of the strip.
+    the distance from the middle of the strip. NaN stands where a facet lies across the plane of
+    the strip, as a plate below its rib.
     """
     face, cell = columns.pairs.T
     used, place = np.unique(cell, return_inverse=True)
@@ -46,7 +47,9 @@ def strip_excess(
     values, slopes = kind.basis(at)
     area = np.linalg.det(np.einsum("eki,qkj->eqij", local[..., [0, 2]], slopes))
     area = np.abs(area) * weights
-    square = (area * (height @ values.T) ** 2).sum(axis=1) / area.sum(axis=1)
+    whole = area.sum(axis=1)
+    whole[whole < FLAT * columns.thickness[face] ** 2] = np.nan
+    square = (area * (height @ values.T) ** 2).sum(axis=1) / whole
     dofs = 6 * (face[:, None] * len(points) + nodes[cell])[..., None] + np.arange(6)
     turns = np.flatnonzero(np.arange(6 * kind.node_count) % 6 > 2)
     bent_u = settled(K, u[:, :1], 0.0 * u[:, :1], dofs.reshape(len(face), -1), turns)
