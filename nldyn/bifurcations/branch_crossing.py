@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 
+from nldyn.base.arrays import Real
+from nldyn.base.errors import ConvergenceError
 from nldyn.bifurcations.point import SpecialPoint
-from nldyn.orbits.bordered import Place, Solved
+from nldyn.orbits.bordered import OrbitFamily, Place, Solved
 from nldyn.orbits.conditions import nearest_crossing
 from nldyn.orbits.shooting import metric_length
 
@@ -18,6 +20,9 @@ FIRST_STEP = 100.0  # of a distance: Newton's method steps no farther to a cross
 NEIGHBOUR = 1e-3  # arclength between two branch points at one turn, and dP/ds there
 SHORTEST_CROSSING = 3e-6  # step over which a branch may cross another one
 SAME = 2.0 * SHORTEST_CROSSING  # distance of branch points that two such steps locate as one
+NOT_NEAR = 0.1  # least over largest singular value, above which no critical orbit is near
+SOLVED = 1e-10  # last step of Newton's method, relative to the orbit
+FARTHEST = 0.5  # Newton step in ln ω that leads nowhere
 
 
 def is_crossing(place: Place) -> bool:
@@ -48,6 +53,53 @@ def crossing_beside(place: Place, longest: float = math.inf) -> Solved | None:
     if float(np.abs(place.orbit.multipliers - 1.0).min()) > NEAR_CRITICAL:
         return None
     return true_crossing(place, longest)
+
+
+def correct_across(family: OrbitFamily, guess: Real, row: Real, level: float) -> Solved | None:
+    """Orbit on the plane ``row @ point = level`` where branches cross nearby.
+
+    There the shooting equations are nearly singular and Newton's method loses the digits that they
+    lose. So the component along the null vector q is held at that of the guess, and a multiple β of
+    the left null vector is added to the equations instead. A guess that lies on the branch in this
+    one component makes β vanish.
+
+    Returns
+    -------
+    Solved or None
+        The orbit's error is the last step or β, relative to the orbit, whichever is larger; None if
+        Newton's method fails or there is no multiplier near 1.
+
+    References
+    ----------
+    Govaerts (2000), chapter 3 (bordered systems).
+    """
+    size = guess.size - 1
+    scale = family.scale(guess) * math.sqrt(family.segments)
+    bordered = np.zeros((size + 2, size + 2))
+    point = guess.copy()
+    q: Real | None = None
+    for _ in range(8):
+        at = family.at(point)
+        try:
+            bordered[:size, :-1], defect = at.jacobian, at.residual
+        except ConvergenceError:
+            return None
+        if q is None:
+            left, values, right = np.linalg.svd(at.jacobian[:, :size])
+            if values[-1] > NOT_NEAR * values[0]:
+                return None
+            q, y = right[-1], left[:, -1]
+        bordered[:size, -1], bordered[size, :-1], bordered[-1, :size] = y, row, q
+        rest = np.append(defect, [row @ point - level, q @ (point - guess)[:size]])
+        step = np.linalg.solve(bordered, -rest)
+        point = point + step[:-1]
+        if not abs(step[size]) < FARTHEST:
+            return None
+        moved = float(np.linalg.norm(step[:size])) / scale
+        if moved < SOLVED:
+            error = max(moved, abs(float(step[-1])) / scale)
+            return Solved(family, point, family.at(point).orbit_by(at.segments.jacobians, error))
+    return None
 
 
 def distance(a: Place, b: Place) -> float:

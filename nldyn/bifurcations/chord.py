@@ -9,8 +9,7 @@ import numpy as np
 
 from nldyn.base.arrays import Real, hermite
 from nldyn.base.errors import LocateError, failing_as
-from nldyn.bifurcations.branch_crossing import NEIGHBOUR, SHORTEST_CROSSING
-from nldyn.bifurcations.normal_form_coefficients import correct_across
+from nldyn.bifurcations.branch_crossing import NEIGHBOUR, SHORTEST_CROSSING, correct_across
 from nldyn.bifurcations.point import BranchNode, node_of
 from nldyn.bifurcations.sign_changes import crosses
 from nldyn.orbits.bordered import FREE, Place, Solved, correct

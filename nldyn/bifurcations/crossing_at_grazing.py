@@ -16,9 +16,8 @@ import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES, LocateError
-from nldyn.bifurcations.branch_crossing import CROSSES, NEAR_CRITICAL
+from nldyn.bifurcations.branch_crossing import CROSSES, NEAR_CRITICAL, correct_across
 from nldyn.bifurcations.chord import BEND, CROSSING_ERROR, Chord
-from nldyn.bifurcations.normal_form_coefficients import correct_across
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.roots import root
 from nldyn.bifurcations.sign_changes import accounted, changed

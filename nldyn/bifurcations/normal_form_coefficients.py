@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES, ComputationError, ConvergenceError
-from nldyn.orbits.bordered import OrbitFamily, Place, Solved
+from nldyn.orbits.bordered import Place
 
 LARGEST_STEP = 0.1  # in ξ, of the differences
 SMALLEST_STEP = 1e-7
@@ -31,9 +31,6 @@ ENOUGH = 1e-6  # relative error of a coefficient that needs no more steps
 SAFETY = 3.0  # times the error seen in a table of differences, of which rounding is a part
 LEAST_ERROR = 1e-8  # relative, of a coefficient: special points are located no better
 DOUBLE = 1e-14  # cosine of left and right vectors, below which a multiplier is double
-NOT_NEAR = 0.1  # least over largest singular value, above which no critical orbit is near
-SOLVED = 1e-10  # last step of Newton's method, relative to the orbit
-FARTHEST = 0.5  # Newton step in ln ω that leads nowhere
 PLAIN = 0.01  # part of the frequency's derivative along the critical vector: no crossing is near
 
 Evaluation = tuple[Real, Real, Hashable]
@@ -108,8 +105,14 @@ class Loop:
         return self._here[1]
 
     def operator(self, mu: complex) -> Vectors:
-        """Matrix of the linear equations; see `operator`."""
-        return operator(self.jacobians, mu)
+        """Matrix (kn, kn) of x ↦ Φ_j' x_j - x_{j+1} with x_{k+1} = μ x_1; real for a real μ."""
+        k, n, _ = self.jacobians.shape
+        last: complex = mu.real if mu.imag == 0.0 else mu
+        matrix = np.zeros((k, n, k, n), dtype=type(last))
+        for j in range(k):
+            matrix[j, :, j] += self.jacobians[j]
+            matrix[j, :, (j + 1) % k] -= np.eye(n) * (last if j == k - 1 else 1.0)
+        return matrix.reshape(k * n, k * n)
 
     def critical(self, mu: complex) -> tuple[Vectors, Vectors]:
         """Right vectors q (k, n) and left vectors y (k, n) of a multiplier μ.
@@ -226,17 +229,6 @@ def estimated(value: Callable[[float], float], *lines: Line) -> Estimate:
     )
 
 
-def operator(jacobians: Real, mu: complex) -> Vectors:
-    """Matrix (kn, kn) of x ↦ Φ_j' x_j - x_{j+1} with x_{k+1} = μ x_1; real for a real μ."""
-    k, n, _ = jacobians.shape
-    last: complex = mu.real if mu.imag == 0.0 else mu
-    matrix = np.zeros((k, n, k, n), dtype=type(last))
-    for j in range(k):
-        matrix[j, :, j] += jacobians[j]
-        matrix[j, :, (j + 1) % k] -= np.eye(n) * (last if j == k - 1 else 1.0)
-    return matrix.reshape(k * n, k * n)
-
-
 def loop_of(place: Place) -> Loop:
     """The segments of an orbit as maps of its states and its parameter, with the finer flow map.
 
@@ -262,56 +254,6 @@ def loop_of(place: Place) -> Loop:
         return jacobians, pace, (at.segments.closings.tobytes(), closed.tobytes())
 
     return Loop(nodes, float(place.point[-1]), evaluate, family.scale(place.point))
-
-
-def correct_across(family: OrbitFamily, guess: Real, row: Real, level: float) -> Solved | None:
-    """Orbit on the plane ``row @ point = level`` where branches cross nearby.
-
-    There the shooting equations are nearly singular and Newton's method loses the digits that they
-    lose. So the component along the null vector q is held at that of the guess, and a multiple β of
-    the left null vector is added to the equations instead. A guess that lies on the branch in this
-    one component makes β vanish.
-
-    Returns
-    -------
-    Solved or None
-        The orbit's error is the last step or β, relative to the orbit, whichever is larger; None if
-        Newton's method fails or there is no multiplier near 1.
-
-    References
-    ----------
-    Govaerts (2000), chapter 3 (bordered systems).
-    """
-    size = guess.size - 1
-    scale = family.scale(guess) * math.sqrt(family.segments)
-    bordered = np.zeros((size + 2, size + 2))
-    point = guess.copy()
-    q: Real | None = None
-    for _ in range(8):
-        at = family.at(point)
-        try:
-            matrix = operator(at.blocks, 1.0)
-            bordered[:size, size] = at.by_parameter(0).ravel()
-            defect = at.residual
-        except ConvergenceError:
-            return None
-        if q is None:
-            left, values, right = np.linalg.svd(matrix)
-            if values[-1] > NOT_NEAR * values[0]:
-                return None
-            q, y = right[-1], left[:, -1]
-        bordered[:size, :size] = matrix
-        bordered[:size, -1], bordered[size, :-1], bordered[-1, :size] = y, row, q
-        rest = np.append(defect, [row @ point - level, q @ (point - guess)[:size]])
-        step = np.linalg.solve(bordered, -rest)
-        point = point + step[:-1]
-        if not abs(step[size]) < FARTHEST:
-            return None
-        moved = float(np.linalg.norm(step[:size])) / scale
-        if moved < SOLVED:
-            error = max(moved, abs(float(step[-1])) / scale)
-            return Solved(family, point, family.at(point).orbit_by(at.segments.jacobians, error))
-    return None
 
 
 def turns_near_crossing(place: Place) -> bool:

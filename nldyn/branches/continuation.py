@@ -13,13 +13,13 @@ from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, n
 from nldyn.bifurcations.branch_crossing import (
     NEIGHBOUR,
     ON_CROSSING,
+    correct_across,
     distance,
     lies_on_crossing,
     same_crossing,
 )
 from nldyn.bifurcations.chord import CROSSING_ERROR
 from nldyn.bifurcations.events import Events, check_values, checked_events
-from nldyn.bifurcations.normal_form_coefficients import correct_across
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.at_frequency import check_requested, requested
 from nldyn.branches.branch import (
