@@ -37,7 +37,7 @@ from nldyn.orbits.bordered import Condition, OrbitFamily, correct, gradient, tan
 from nldyn.orbits.conditions import Held, Monitor, defined_by
 from nldyn.orbits.orbit import Orbit, check_minimal, same_orbit
 from nldyn.runtime.progress import of_place, shows_progress
-from nldyn.system.chart import Chart, checked_parameter, value_of
+from nldyn.system.chart import Chart, checked_parameter, parameter_name, value_of
 from nldyn.system.parameters import Parameter
 from nldyn.system.system import System
 
@@ -160,7 +160,7 @@ class Curve:
             columns["type"] = np.array([mark.kind for mark in self.marks], dtype=str)
         values = np.array([row.values for row in rows], dtype=float)
         by_parameter = values.reshape(-1, len(self.parameters)).T
-        columns.update(zip(map(_column_name, self.parameters), by_parameter, strict=True))
+        columns.update(zip(map(parameter_name, self.parameters), by_parameter, strict=True))
         for name, column in orbit_columns([row.orbit for row in rows]).items():
             columns.setdefault(name, column)
         columns["residual"] = np.array([row.residual for row in rows], dtype=float)
@@ -244,19 +244,14 @@ class Curve:
     def _index_of(self, wanted: str | Parameter) -> int:
         """Place of a parameter among the curve's."""
         own = list(enumerate(self.parameters))
-        matches = [i for i, p in own if wanted in (p, _column_name(p))]
+        matches = [i for i, p in own if wanted in (p, parameter_name(p))]
         matches = matches or [i for i, p in own if wanted == p.name]
         if len(matches) != 1:
-            columns = ", ".join(map(_column_name, self.parameters))
+            columns = ", ".join(map(parameter_name, self.parameters))
             raise SystemModelError(
                 f"the curve has no parameter {shown(wanted)}; there are: {columns}"
             )
         return matches[0]
-
-
-def _column_name(parameter: Parameter) -> str:
-    """Name of a parameter in a table, with its index where that is not 0."""
-    return f"{parameter.name}_{parameter.index}" if parameter.index else parameter.name
 
 
 @shows_progress(of_place("curve"))

@@ -160,11 +160,6 @@ class Motion:
         """
         return np.asarray(self.flow.to_start(end_state(self.stretches[-1])))
 
-    @property
-    def end_phase_deg(self) -> float:
-        """Forcing phase at the end in degrees, from 0 to 360."""
-        return math.degrees(end_phase(self.stretches[-1])) % 360.0
-
     def history(self, samples: int = 1000) -> History:
         """Sample the motion: displacements, penetrations and contact forces.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Protocol
@@ -20,6 +20,7 @@ from nldyn.reduction.model_errors import (
     reductions,
     reference_model,
 )
+from nldyn.system.naming import quoted
 
 ALL_MODES_UP_TO = 1500  # degrees of freedom; of larger ones the reference is reduced, too
 
@@ -144,7 +145,7 @@ class JoinedComponents:
     def __repr__(self) -> str:
         """One line: the names, and how many joints."""
         joints = f"{len(self.joints)} joint{'' if len(self.joints) == 1 else 's'}"
-        return f"<JoinedComponents {listed([*self.components, *self.kept])}, {joints}>"
+        return f"<JoinedComponents {quoted([*self.components, *self.kept])}, {joints}>"
 
     @property
     def dofs(self) -> int:
@@ -155,12 +156,12 @@ class JoinedComponents:
     @property
     def counted(self) -> str:
         """What the number of modes of a model means."""
-        said = f"modes are counted in each component ({listed(self.components)}); one with fewer "
+        said = f"modes are counted in each component ({quoted(self.components)}); one with fewer "
         said += "keeps all that it has"
         if len(self.components) == 1:
-            said = f"modes are counted in the component {listed(self.components)}"
+            said = f"modes are counted in the component {quoted(self.components)}"
         if self.kept:
-            said += f"; the same in all models: {listed(self.kept)}"
+            said += f"; the same in all models: {quoted(self.kept)}"
         return said
 
     def most_modes(self, methods: Sequence[str]) -> int:
@@ -236,11 +237,6 @@ def receptance_bound(
     grid = np.linspace(*setting.range_hz, GRID)
     band = studied.receptance_error(known, grid, observed)
     return float(np.linalg.norm(np.abs(band).max(axis=1)) / np.linalg.norm(linear.receptance))
-
-
-def listed(names: Iterable[str]) -> str:
-    """Names one after the other."""
-    return ", ".join(f"'{name}'" for name in names)
 
 
 def last_up_to(count: int, models: Sequence[cms.ReducedModel]) -> cms.ReducedModel:

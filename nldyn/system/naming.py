@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from nldyn.system.round_stop import RoundStop
@@ -93,7 +93,7 @@ def slider_name(system: System, number: int) -> str:
     return f"{name}, {stop_name(system, slider.stop)}" if slider.stop >= 0 else name
 
 
-def quoted(names: Sequence[str]) -> str:
+def quoted(names: Iterable[str]) -> str:
     """Some names in a sentence.
 
     Examples
