@@ -22,6 +22,7 @@ from nldyn.flow.rigid import (
     series_to_rest,
 )
 from nldyn.flow.sliding import SliderMeasures, slider_measures
+from nldyn.orbits.areas import AreaMeasures, area_measures
 from nldyn.orbits.history import History
 from nldyn.orbits.multipliers import (
     COARSE,
@@ -38,6 +39,7 @@ from nldyn.orbits.shooting import ShootingProblem
 from nldyn.system.round_stop import RoundStop
 from nldyn.system.system import System
 
+AREA_SAMPLES = 1000  # of a forcing period
 SAME_PHASE = 1e-9  # in rad: an extreme and an impact
 LIFTS_OFF = 1e-5  # rad behind rest, where a flight that grows with their cube is rounding
 SAME = 1e-5  # distance of orbits that are one, relative to their size
@@ -499,6 +501,15 @@ class Orbit:
     def friction(self) -> tuple[SliderMeasures, ...]:
         """What each of the `System.sliders` does in a period of the orbit."""
         return slider_measures(self.trajectory)
+
+    @cached_property
+    def areas(self) -> tuple[AreaMeasures, ...]:
+        """What each of the `System.areas` does in a period, by 1000 samples of a forcing period."""
+        force = self.history(AREA_SAMPLES * self.period).force[:-1]
+        return tuple(
+            area_measures(name, self.system.area_stops(name), force[:, list(places)])
+            for name, places in self.system.areas.items()
+        )
 
     def _elastic_list(self, index: int) -> list[Impact]:
         """Contact peaks at a stop that gives way."""

@@ -49,6 +49,7 @@ def answer_lines(diagram: Diagram, special_points: Table) -> list[str]:
     return [
         _peak_line(nodes, along, diagram.observe),
         *_contact_lines(nodes, along),
+        *_area_lines(nodes, along),
         *_friction_lines(nodes, along),
         f"stable and periodic: {_listed(stable, along)}",
         f"nothing stable was found: {_listed(gaps(stable, diagram.limits), along)}",
@@ -121,6 +122,24 @@ def _hardness(hit: Impact | None) -> float:
 def _hardest(orbit: Orbit, among: Sequence[int]) -> Impact | None:
     """The hardest contact of an orbit with some stops."""
     return max((hit for hit in orbit.impact_list if hit.stop in among), key=_hardness, default=None)
+
+
+def _area_lines(nodes: Sequence[BranchNode], along: Along) -> list[str]:
+    """Where each area of contact is pressed hardest: its whole force, and what touches."""
+    lines = []
+    for number, (name, places) in enumerate(nodes[0].orbit.system.areas.items()):
+        hits = [_hardness(_hardest(node.orbit, places)) for node in nodes]
+        if not any(hits):
+            lines.append(f"contact area '{name}': it is not touched")
+            continue
+        node = nodes[hits.index(max(hits))]
+        found = node.orbit.areas[number]
+        lines.append(
+            f"contact area '{name}': {found.peak_force:.4g} N in all at {along.told(node.value)}, "
+            f"where {100.0 * found.touched:.3g} % of it touches, "
+            f"{100.0 * found.closed:.3g} % on average"
+        )
+    return lines
 
 
 def _friction_lines(nodes: Sequence[BranchNode], along: Along) -> list[str]:

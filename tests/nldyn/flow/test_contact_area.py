@@ -117,6 +117,16 @@ def test_an_area_is_followed_in_its_gap_and_stiffness_and_kept_in_files(tmp_path
     assert stop_name(system, 1) == "'edge', point 2 of 5"
 
 
+def test_measures_of_an_area_are_those_of_one_stop_of_the_sum():
+    (found,) = solve_orbit(body(area(), 4), 1.3).areas
+    one = solve_orbit(body([Stop("tip", 50.0, 1.0, 0.2)]), 1.3)
+    force = one.history(1000).force[:-1, 0]
+    assert np.isclose(found.peak_force, force.max(), rtol=1e-10)
+    assert np.isclose(found.mean_force, force.mean(), rtol=1e-10)
+    assert found.touched == 1.0 and np.isclose(found.closed, np.mean(force > 0.0), atol=2e-3)
+    assert np.allclose(found.pressure, force.max(), rtol=1e-10)  # the weights sum to 1 m²
+
+
 def test_the_gap_of_an_area_is_that_of_its_nearest_point():
     system = wedge()
     gaps = np.array([stop.gap for stop in system.stops])
