@@ -69,6 +69,13 @@ class LockingWarning(UserWarning):
     """
 
 
+class CurvedCellsWarning(LockingWarning):
+    """Curved cells of second order that, each by itself, are likely to be too stiff in bending.
+
+    In a thick part it need not matter: where there are modes, `Component.mesh_errors` knows.
+    """
+
+
 class MeshWarning(UserWarning):
     """Modes whose frequencies the mesh makes likely too high, and by how much."""
 
@@ -289,8 +296,8 @@ def assemble(model: StructureModel) -> Component:
     stiffness, mass = unconstrained_matrices(model, numbering)
     looked_at = boundary(model)
     check_nothing_hangs(model, looked_at)
-    for text in locking_warnings(model, looked_at):
-        warnings.warn(text, LockingWarning, stacklevel=2)
+    for text, curved in locking_warnings(model, looked_at):
+        warnings.warn(text, CurvedCellsWarning if curved else LockingWarning, stacklevel=2)
     for text in overlap_warnings(model, looked_at):
         warnings.warn(text, JointWarning, stacklevel=2)
     K = constraints.reduced(stiffness)

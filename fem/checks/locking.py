@@ -60,8 +60,11 @@ Finding = tuple[FloatArray, str]
 """Excess and a figure for each face, (f, 2), and the sentence that the figure goes into."""
 
 
-def locking_warnings(model: StructureModel, looked_at: Boundary) -> Iterator[str]:
-    """One sentence for all cells of a kind in a part that are likely to be over 5 % too stiff."""
+def locking_warnings(model: StructureModel, looked_at: Boundary) -> Iterator[tuple[str, bool]]:
+    """A sentence for all cells of a kind in a part that are likely to be over 5 % too stiff.
+
+    With each whether it is that they are curved, which modes show better.
+    """
     outer, edges = looked_at
     pieces = [piece for piece in model.solid_cells if not piece.reduced]
     strips = [
@@ -86,21 +89,22 @@ def locking_warnings(model: StructureModel, looked_at: Boundary) -> Iterator[str
 
 def _told(
     model: StructureModel, name: str, kind: CellKind, where: str, found: list[Finding]
-) -> Iterator[str]:
+) -> Iterator[tuple[str, bool]]:
     """The sentence on the greatest of some findings, if there is one to tell."""
-    most, why = TOLERABLE, ""
+    most, why, curved = TOLERABLE, "", False
     for values, words in found:
         values = values[np.isfinite(values[:, 0])]
         if len(values):
             order = np.argsort(values[:, 0])
             excess_there, figure = values[order[min(int(MOST * len(order)), len(order) - 1)]]
             if excess_there > most:
-                most, why = excess_there, words.format(figure)
+                most, why, curved = excess_there, words.format(figure), words == CURVED
     if why:
-        yield (
+        text = (
             f"{model.mesh.source}: part {name!r}: {where}, its {kind.name} are likely about"
             f" {1.0 + most:.3g} times too stiff: {why}"
         )
+        yield text, curved
 
 
 def own_cells(

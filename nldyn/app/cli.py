@@ -260,7 +260,9 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
             build_parts,
             build_reduced,
             build_system,
+            doubts_until_modes,
             join,
+            tell_mesh_errors,
         )
         from nldyn.scene.checks import (
             check_computable,
@@ -275,12 +277,15 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
         loaded = load_scene(scene, mesh_folders)
         with messages_shown():
             reduced = candidates = None
-            component = None if loaded.reduction is None else build_any(loaded)
-            if loaded.reduction is not None and loaded.reduction.tolerance is not None:
-                candidates = build_candidates(loaded, component)
-                reduced = candidates.reduced()
-            elif component is not None:
-                reduced = build_reduced(loaded, component)
+            with doubts_until_modes() as doubts:
+                component = None if loaded.reduction is None else build_any(loaded)
+                if loaded.reduction is not None and loaded.reduction.tolerance is not None:
+                    candidates = build_candidates(loaded, component)
+                    reduced = candidates.reduced()
+                elif component is not None:
+                    reduced = build_reduced(loaded, component)
+                if reduced is not None and tell_mesh_errors(component, reduced):
+                    doubts.clear()
             parts = {"": component} if component is not None else build_parts(loaded)
             if loaded.components:
                 reduced = join(loaded, parts)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 import numpy as np
 from scipy import sparse
@@ -16,7 +17,7 @@ import cms
 import fem
 from cms.reduction.doubt import check_unreduced
 from cms.reduction.seen import told_of_seen
-from fem.assembly.component import MOST_ERROR
+from fem.assembly.component import MOST_ERROR, CurvedCellsWarning
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LARGEST_DENSE, ConvergenceError, SystemModelError
 from nldyn.reduction.candidates import Candidates, candidate_modes
@@ -94,19 +95,56 @@ def build_structure(scene: Scene, progress: Progress | None = None) -> Structure
         return Structure(None, join(scene, parts), parts)
     if scene.reduction is None:
         return Structure()
-    component = build_any(scene)
-    reduced = build_reduced(scene, component, progress)
-    if isinstance(component, fem.Component):
-        tell_mesh_errors(component, reduced)
+    with doubts_until_modes() as doubts:
+        component = build_any(scene)
+        reduced = build_reduced(scene, component, progress)
+        if tell_mesh_errors(component, reduced):
+            doubts.clear()
     return Structure(component, reduced)
 
 
-def tell_mesh_errors(component: fem.Component, reduced: cms.ReducedModel) -> None:
-    """Warn of the mesh where it makes some of the lowest modes' frequencies likely too high."""
+@contextmanager
+def doubts_until_modes() -> Iterator[list[tuple[Warning | str, type[Warning], str, int]]]:
+    """Hold warnings of curved cells back; those that are left in the list at the end are shown."""
+    held: list[tuple[Warning | str, type[Warning], str, int]] = []
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+
+        def show(
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: TextIO | None = None,
+            line: str | None = None,
+        ) -> None:
+            if issubclass(category, CurvedCellsWarning):
+                held.append((message, category, filename, lineno))
+            else:
+                shown(message, category, filename, lineno, file, line)
+
+        warnings.showwarning = show
+        try:
+            yield held
+        finally:
+            for each in held:
+                shown(*each)
+
+
+def tell_mesh_errors(component: AnyComponent | None, reduced: cms.ReducedModel) -> bool:
+    """Warn of the mesh where it makes some of the lowest modes' frequencies likely too high.
+
+    Returns
+    -------
+    bool
+        Whether there are such modes, of a mesh, and none is likely too high.
+    """
+    if not isinstance(component, fem.Component):
+        return False
     elastic = np.flatnonzero(reduced.frequencies_hz > 0.0)
     at = elastic[elastic < len(reduced.frequencies_hz) - reduced.residual_modes][:ESTIMATED]
     if not len(at):
-        return
+        return False
     errors = component.mesh_errors(reduced.expand(np.eye(len(reduced.frequencies_hz))[:, at]))
     told = [
         f"mode {mode + 1} ({frequency:.4g} Hz) by "
@@ -120,6 +158,7 @@ def tell_mesh_errors(component: fem.Component, reduced: cms.ReducedModel) -> Non
             f" {', '.join(told)}; take shorter cells, or cells of second order"
         )
         warnings.warn(text, fem.MeshWarning, stacklevel=3)
+    return not told
 
 
 def build_reduced(

@@ -10,7 +10,7 @@ from mesh_errors import SHELLS, TABLES, angle, counts, errors, lowest_modes, pla
 
 import cms
 import fem
-from nldyn.scene.build import TOLD_ERROR, tell_mesh_errors
+from nldyn.scene.build import TOLD_ERROR, doubts_until_modes, tell_mesh_errors
 
 DOC = Path(__file__).resolve().parents[3] / "docs" / "results" / "elements.md"
 COARSE = [
@@ -88,6 +88,27 @@ def test_a_scene_tells_of_its_mesh_by_mode_and_amount():
         warnings.simplefilter("error")
         fine = plate("hexahedron20", 8, 0.01, "supported")
         tell_mesh_errors(fine, cms.reduce(fine, modes=1))
+
+
+def bracket():
+    mesh = fem.read_mesh(DOC.parents[2] / "tests" / "fem" / "data" / "gmsh_bracket.msh")
+    part = fem.SolidPart(fem.Material(2.1e11, 7800.0, 0.3))
+    return fem.StructureModel(mesh, {"bracket": part}, [fem.Support("foot", ("x", "y", "z"))])
+
+
+@pytest.mark.parametrize("told", [False, True])
+def test_curved_cells_are_told_of_where_the_modes_do_not_find_them_good(told):
+    """Cut into eighths the cells of the bracket give 0.4, 0.4, 1.0 and 1.0 % less."""
+    model = ring("tetra10", 16, 0.1).model if told else bracket()
+    with warnings.catch_warnings(record=True) as caught, doubts_until_modes() as doubts:
+        warnings.simplefilter("always")
+        component = fem.assemble(model)
+        assert len(doubts) == 1 and "times too stiff: they are curved" in str(doubts[0][0])
+        if tell_mesh_errors(component, cms.reduce(component, modes=4)):
+            doubts.clear()
+    kinds = {warning.category for warning in caught}
+    assert any(issubclass(kind, fem.LockingWarning) for kind in kinds) == told
+    assert (fem.MeshWarning in kinds) == told
 
 
 def test_a_rib_on_a_plate_is_assembled_without_a_word():
