@@ -98,8 +98,8 @@ FAULTS = [
     Fault(
         "the test function of a flip has no sign",
         "nldyn/bifurcations/sign_changes.py",
-        "PD=flip_test(mu)",
-        "PD=abs(flip_test(mu))",
+        "PD=found.flip",
+        "PD=abs(found.flip)",
         "nldyn/branches/test_harmonic_branch.py",
     ),
     Fault(
@@ -191,8 +191,8 @@ FAULTS = [
     Fault(
         "folds are told as flips, and flips as folds",
         "nldyn/bifurcations/sign_changes.py",
-        "LP=float(point.tangent[-1]),\n            PD=flip_test(mu),",
-        "PD=float(point.tangent[-1]),\n            LP=flip_test(mu),",
+        "LP=float(point.tangent[-1]),\n            PD=found.flip,",
+        "PD=float(point.tangent[-1]),\n            LP=found.flip,",
         "nldyn/branches/test_harmonic_branch.py",
     ),
     Fault(

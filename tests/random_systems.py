@@ -19,8 +19,8 @@ import numpy as np
 
 from nldyn.base.errors import SystemModelError
 from nldyn.engine.layout import INTERRUPTED, StopRow, SystemData, empty_record
-from nldyn.engine.newton import Corrector, newton, packed_record, packed_system
-from nldyn.engine.sample import local_extremes, sample_states
+from nldyn.engine.newton import Corrector, newton, packed_system
+from nldyn.engine.sample import local_extremes, sample_states, touches
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.gauss import gauss_tables
 from nldyn.orbits.periodic_schur import product_eigenvalues
@@ -90,7 +90,7 @@ def try_system(rng: np.random.Generator) -> int:
     size, n_stops, k = len(data.force), len(data.stops), int(rng.integers(1, 4))
     tables = gauss_tables(int(rng.integers(4, 15)), int(rng.choice([2, 4])))
     record = empty_record(int(rng.choice([0, 20, 400])), size, n_stops, tables.nodes.size)
-    system, room = packed_system(data), packed_record(record)
+    system = packed_system(data)
     point = np.append(1e-4 * rng.standard_normal(k * size), np.log(rng.uniform(1.0, 500.0)))
     if rng.random() < 0.1:
         point[rng.integers(point.size)] = rng.choice(BAD)
@@ -100,16 +100,17 @@ def try_system(rng: np.random.Generator) -> int:
     corrector = Corrector(row, float(point[-1]), 1e4, 1e-8, 1.0, 3, point.copy(), -1, 0.0)
     none = np.zeros((0, 2), dtype=np.int64), np.zeros((0, *data.drive.shape), dtype=complex)
     found = newton(
-        system, tables.packed(), room, True, 1.0, point, phases, False, True, *none, corrector,
-        size, n_stops,
+        system, tables.packed(), record, True, 1.0, point, phases, False, True, *none, corrector,
+        n_stops,
     )  # fmt: skip
     product_eigenvalues(found.jacobians)
-    if record.used[0]:
+    if record.used:
         for _ in range(2):
             output = int(rng.integers(data.rows.shape[1]))
-            local_extremes(system, tables.packed(), room, 100.0, np.zeros(0), np.zeros(0), output)
+            local_extremes(system, tables.packed(), record, 100.0, np.zeros(0), np.zeros(0), output)
+        touches(system, tables.packed(), record, 100.0, np.zeros(n_stops), 1e-3)
         here = np.sort(rng.uniform(0.0, 6.0, 20))
-        sample_states(system, tables.packed(), room, 100.0, here, size)
+        sample_states(system, tables.packed(), record, 100.0, here)
     return found.outcome
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
+from contextlib import ContextDecorator
 from numbers import Integral, Real
 from reprlib import repr as shortened
 from typing import Any, TypeGuard
@@ -153,8 +153,22 @@ class LocateError(ComputationError):
 FAILURES = (ComputationError, SystemModelError, ArithmeticError, np.linalg.LinAlgError)
 
 
-@contextmanager
-def failing_as(kind: type[ComputationError]) -> Iterator[None]:
+class _FailingAs(ContextDecorator):
+    """See `failing_as`."""
+
+    def __init__(self, kind: type[ComputationError]) -> None:
+        self.kind = kind
+
+    def __enter__(self) -> None:
+        """Nothing to prepare."""
+
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
+        """Raise a failure of the kind in place of any other."""
+        if isinstance(error, FAILURES) and not isinstance(error, self.kind):
+            raise self.kind(str(error)) from error
+
+
+def failing_as(kind: type[ComputationError]) -> _FailingAs:
     """Tell what a computation from sound input ends in as one kind of failure.
 
     So that a number beyond all systems, met on the way, is not told as a fault of what was given.
@@ -168,12 +182,7 @@ def failing_as(kind: type[ComputationError]) -> Iterator[None]:
         ...
     nldyn.base.errors.LocateError: math range error
     """
-    try:
-        yield
-    except FAILURES as error:
-        if isinstance(error, kind):
-            raise
-        raise kind(str(error)) from error
+    return _FailingAs(kind)
 
 
 def must_be_symmetric(name: str) -> str:

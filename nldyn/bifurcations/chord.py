@@ -40,7 +40,7 @@ class Chord:
 
     @cached_property
     def _weights(self) -> Real:
-        return self.first.family.metric(self.first.point)
+        return self.first.weights
 
     @cached_property
     def _length(self) -> float:

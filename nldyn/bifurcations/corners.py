@@ -146,9 +146,9 @@ def extremes_meet(here: BranchNode, within: float = MEETS) -> bool:
     grazing = here.condition
     if not isinstance(grazing, Grazing):
         return False
-    found, full = here.orbit.touches(grazing.stop), 2.0 * math.pi * here.orbit.period
-    other = nearest(found.phases, found.is_maximum, not grazing.is_maximum, grazing.phase, full)
-    return bool(other >= 0 and abs(found.values[other]) < within * grazing.unit)
+    found, full = here.orbit.touched, 2.0 * math.pi * here.orbit.period
+    other = nearest(found, 2 * grazing.stop + (not grazing.is_maximum), grazing.phase, full)
+    return other >= 0 and abs(float(found[other, 1])) < within * grazing.unit
 
 
 def grazes_linear(orbit: Orbit) -> bool:

@@ -8,17 +8,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Complex, Real
-from nldyn.engine.library import address_of, function
-from nldyn.engine.numbers import complexes, reals
-from nldyn.orbits.critical_functions import travel
-from nldyn.orbits.periodic_schur import product_eigenvalues
+from nldyn.engine.library import HOST, Packed, function
+from nldyn.engine.numbers import address_of, complexes, reals
+from nldyn.orbits.periodic_schur import NO_MEMORY
 
 _WHOLE, _NUMBER, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 _between = function(
-    "nldyn_jacobians_between", _WHOLE, _POINTER, _POINTER, _WHOLE, _WHOLE, _WHOLE, _POINTER,
-    _POINTER, result=None,
-)  # fmt: skip
-_off_circle = function("nldyn_off_circle", _WHOLE, _POINTER, result=_NUMBER)
+    "nldyn_multipliers_between", *[ctypes.c_char_p] * 2, *[_WHOLE] * 3, _POINTER, _POINTER
+)
+_error = function(
+    "nldyn_error_half_way",
+    *[ctypes.c_char_p] * 2,
+    _WHOLE,
+    _WHOLE,
+    _POINTER,
+    _POINTER,
+    result=_NUMBER,
+)
+_half_way = function(
+    "nldyn_half_way",
+    *[ctypes.c_char_p] * 2,
+    _WHOLE,
+    _POINTER,
+    _POINTER,
+    _NUMBER,
+    _POINTER,
+    _POINTER,
+)
 _meetings = function("nldyn_meetings", _WHOLE, _POINTER, _POINTER, *[_NUMBER] * 3, _WHOLE)
 _doubtful = function("nldyn_doubtful", _WHOLE, _WHOLE, _POINTER, _POINTER, _NUMBER, _POINTER)
 _dips = function(
@@ -29,48 +45,69 @@ _dips = function(
 _return = function("nldyn_return_of_outside", _WHOLE, _WHOLE, _POINTER, _POINTER)
 
 
-def jacobians_between(jacobians: Real, places: Real, first: int, last: int, sigmas: Real) -> Real:
-    """Jacobians (m, k, n, n) at positions (m,) between those (p, k, n, n) of p orbits.
+class Along:
+    """Jacobians of some orbits along a branch.
 
-    Those from first up to last are taken, a polynomial for each segment.
+    Parameters
+    ----------
+    jacobians : (p, k, n, n)
+        Of the segments of p orbits.
+    places : (p,)
+        Where these are.
     """
-    jacobians, places, sigmas = reals(jacobians), reals(places), reals(sigmas)
-    found = np.empty((sigmas.size, *jacobians.shape[1:]))
-    _between(
-        jacobians[0].size, address_of(jacobians), address_of(places), first, last, sigmas.size,
-        address_of(sigmas), address_of(found),
-    )  # fmt: skip
-    return found
 
+    def __init__(self, jacobians: Real, places: Real) -> None:
+        self.count, self.n = len(places), jacobians.shape[-1]
+        self._packed = Packed(*jacobians.shape[1:3], reals(jacobians), reals(places))
 
-def interpolated(jacobians: Real, places: Real, first: int, last: int, sigmas: Real) -> Complex:
-    """Multipliers (m, n) of those Jacobians: they themselves are not smooth where they meet."""
-    between = jacobians_between(jacobians, places, first, last, sigmas)
-    return np.array([product_eigenvalues(pieces)[0] for pieces in between])
+    def multipliers(self, sigmas: Real) -> Complex:
+        """Those (m, n) of the Jacobians at positions (m,), a polynomial for each segment.
 
+        The multipliers themselves are not smooth where they meet.
+        """
+        sigmas = reals(sigmas)
+        found = np.empty((sigmas.size, self.n), dtype=np.complex128)
+        done = _between(
+            HOST,
+            self._packed.content,
+            0,
+            self.count,
+            sigmas.size,
+            address_of(sigmas),
+            address_of(found),
+        )
+        if not done:
+            raise MemoryError(NO_MEMORY)
+        return found
 
-def error_half_way(jacobians: Real, places: Real, first: int, middle: Complex) -> float:
-    """How far the multipliers near the circle move where an orbit is left out.
+    def half_way(self, before: Complex, after: Complex, calm: float) -> tuple[bool, Complex, float]:
+        """Whether no multiplier comes near the circle between two of the orbits, at 0 and 1.
 
-    They are those half-way between the places first and first + 1.
-    """
-    sigmas = np.array([0.5])
-    if places.size == 3:
-        return travel(middle, interpolated(jacobians, places, first, first + 2, sigmas)[0])
-    left = interpolated(jacobians, places, 0, 3, sigmas)[0]
-    right = interpolated(jacobians, places, 1, 4, sigmas)[0]
-    return max(travel(middle, left), travel(middle, right))
+        That is where all move by less than `calm` times their distance from it in half the step.
+        And the multipliers half-way, and how far one moves in all.
+        """
+        before, after = complexes(before), complexes(after)
+        middle, way = np.empty(self.n, dtype=np.complex128), _NUMBER()
+        is_calm = _half_way(
+            HOST, self._packed.content, self.count, address_of(before), address_of(after), calm,
+            address_of(middle), ctypes.addressof(way),
+        )  # fmt: skip
+        if is_calm < 0:
+            raise MemoryError(NO_MEMORY)
+        return bool(is_calm), middle, way.value
 
+    def error_half_way(self, first: int, middle: Complex) -> float:
+        """How far the multipliers near the circle move where an orbit is left out.
 
-def off_circle(multipliers: Complex) -> float:
-    """Distance of the nearest multiplier from the unit circle."""
-    multipliers = complexes(multipliers)
-    return float(_off_circle(multipliers.size, address_of(multipliers)))
-
-
-def farthest_travel(before: Complex, after: Complex) -> float:
-    """Longest way of a multiplier near the circle from one set to the other, either way."""
-    return max(travel(before, after), travel(after, before))
+        They are those half-way between the places first and first + 1.
+        """
+        middle, found = complexes(middle), np.empty(self.n, dtype=np.complex128)
+        error = float(
+            _error(HOST, self._packed.content, self.count, first, *map(address_of, (middle, found)))
+        )
+        if error < 0.0:
+            raise MemoryError(NO_MEMORY)
+        return error
 
 
 def meetings(

@@ -15,13 +15,10 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Complex
 from nldyn.bifurcations.hidden_multipliers import (
+    Along,
     dips_towards_circle,
     doubtful,
-    error_half_way,
-    farthest_travel,
-    interpolated,
     meetings,
-    off_circle,
     return_of_outside,
 )
 from nldyn.orbits.orbit import Orbit
@@ -44,18 +41,15 @@ class Between:
     """
 
     def __init__(self, orbits: Sequence[Orbit], places: Sequence[float]) -> None:
-        self.jacobians = np.array([orbit.jacobians for orbit in orbits])
         self.places = np.array(places)
+        self.along = Along(np.array([orbit.jacobians for orbit in orbits]), self.places)
         self.first = int(np.flatnonzero(self.places == 0.0)[0])
         self.spectra = [orbit.multipliers for orbit in orbits]
         self.ends = [orbits[self.first + i].multipliers for i in range(2)]
 
     def at(self, sigmas: Sequence[float]) -> NDArray[np.complex128]:
         """Multipliers (m, 2n) at positions (m,) by interpolation."""
-        count = self.places.size
-        return np.asarray(
-            interpolated(self.jacobians, self.places, 0, count, np.array(sigmas, dtype=float))
-        )
+        return self.along.multipliers(np.array(sigmas, dtype=float))
 
     def where_to_look(self) -> float | None:
         """Position of an orbit that would tell whether a multiplier crosses the circle twice.
@@ -65,12 +59,11 @@ class Between:
         before, after = self.ends
         if self.places.size == 2:
             return 0.5
-        middle = self.at([0.5])[0]
-        speed = 2.0 * max(farthest_travel(before, middle), farthest_travel(middle, after))
+        calm, middle, speed = self.along.half_way(before, after, CALM)
         known = {0.0: before, 0.5: middle, 1.0: after}
-        if self._calm(before, middle, speed) and self._calm(middle, after, speed):
+        if calm:
             return None
-        error = error_half_way(self.jacobians, self.places, self.first, middle)
+        error = self.along.error_half_way(self.first, middle)
         fresh = {0.5}
         while fresh:
             sigmas = sorted(known)
@@ -99,10 +92,6 @@ class Between:
         sets = np.array([known[sigma] for sigma in places])
         odd = max(return_of_outside(places, sets), doubtful(places, sets, 4.0 * error))
         return None if odd < 0 else float(places[odd])
-
-    def _calm(self, before: Complex, after: Complex, speed: float) -> bool:
-        """Whether all multipliers are too far from the circle to come near it in half a step."""
-        return bool(speed < CALM * min(off_circle(before), off_circle(after)))
 
     def _beside_dips(self, known: dict[float, Complex], error: float) -> set[float]:
         """Positions half-way to the next known ones from where a multiplier nears the circle."""

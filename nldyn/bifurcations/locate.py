@@ -57,7 +57,7 @@ def located_between(a: BranchNode, b: BranchNode, depth: int = 0) -> list[Specia
     """
     chord = Chord(a, b)
     signs = changed(a, b)
-    if "NS" in signs and not leaves_circle(a.orbit.multipliers, b.orbit.multipliers):
+    if "NS" in signs and not leaves_circle(a.orbit, b.orbit):
         signs.remove("NS")
     kinds = _told_apart(signs)
     lonely_fold = "LP" in signs and "BP" not in signs
@@ -91,7 +91,7 @@ def _located(kind: str, chord: Chord) -> list[SpecialPoint]:
     away = np.abs(special.orbit.multipliers - KINDS[kind].multiplier).min()
     if away > NEAR_CRITICAL:
         raise LocateError("a test function jumps, as it does from one branch to another")
-    if kind == "NS" and not _on_unit_circle(special.orbit.multipliers):
+    if kind == "NS" and not _on_unit_circle(special.orbit):
         return []
     if kind == "LP" and _is_plain_fold(chord):
         return [special]

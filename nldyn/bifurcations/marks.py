@@ -148,7 +148,7 @@ def _changes_of_sign(
     """Tests that change sign between two points, with the names of what they tell of."""
     before, after = curve_tests(a), curve_tests(b)
     names = [name for name in before if before[name] * after[name] < 0.0]
-    if not leaves_circle(a.orbit.multipliers, b.orbit.multipliers):
+    if not leaves_circle(a.orbit, b.orbit):
         names = [name for name in names if name not in ("NS", "GRNS")]
     return [
         (name, lambda point, name=name: curve_tests(point)[name])  # type: ignore[misc]

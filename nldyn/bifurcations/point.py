@@ -20,6 +20,7 @@ from nldyn.orbits.bordered import (
 )
 from nldyn.orbits.conditions import Grazing, Phase
 from nldyn.orbits.orbit import Orbit, shifted_alike, stroboscopic
+from nldyn.orbits.shooting import asymmetry
 from nldyn.system.chart import told_value, value_of
 from nldyn.system.parameters import Parameter
 
@@ -78,6 +79,16 @@ class BranchNode:
     def at(self) -> Evaluation:
         """The equations of the family at the point."""
         return self.family.at(self.point)
+
+    @cached_property
+    def weights(self) -> Real:
+        """Metric (N + m,) of the family at the point."""
+        return self.family.metric(self.point)
+
+    @cached_property
+    def asymmetry(self) -> float:
+        """See `nldyn.orbits.shooting.asymmetry`."""
+        return asymmetry(self.family.problem, self.point)
 
     @property
     def values(self) -> Real:

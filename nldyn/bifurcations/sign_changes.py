@@ -7,18 +7,11 @@ import numpy as np
 from nldyn.base.arrays import Complex
 from nldyn.bifurcations.kinds import KINDS
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
-from nldyn.orbits.critical_functions import (
-    branch_point_test,
-    flip_test,
-    nearest_pair,
-    number_outside,
-    torus_test,
-)
+from nldyn.orbits.critical_functions import ROUNDED_MODULUS, number_outside
 from nldyn.orbits.orbit import Orbit
 
 ON_CIRCLE = 1e-8  # of a product of two multipliers: rounding of one that is 1
 ROUNDED = 1e-8  # below which the sign of a branch point's test may be rounding
-ROUNDED_MODULUS = 1e-6  # error of a multiplier's modulus that may be rounding
 COMPLEX = 1e-6  # share of the imaginary part, above which a multiplier is not real
 
 
@@ -29,13 +22,13 @@ def tests(point: BranchNode) -> dict[str, float]:
     fours, which is no Neimark-Sacker point; the torus test is rounding noise there.
     """
     if not point.tests:
-        mu = point.orbit.multipliers
-        pairs = mu.size > 2 and not point.orbit.system.conservative
+        orbit, found = point.orbit, point.orbit.critical
+        pairs = orbit.multipliers.size > 2 and not orbit.system.conservative
         point.tests.update(
             LP=float(point.tangent[-1]),
-            PD=flip_test(mu),
-            BP=branch_point_test(mu),
-            NS=torus_test(mu) if pairs else 1.0,
+            PD=found.flip,
+            BP=found.branch_point,
+            NS=found.torus if pairs else 1.0,
         )
     return point.tests
 
@@ -58,7 +51,8 @@ def accounted(a: Orbit, found: list[SpecialPoint], b: Orbit) -> bool:
 
     At each of them the other multipliers tell the number outside on either side.
     """
-    outside = _possible_outside(a.multipliers)
+    fewest, most = a.critical.outside
+    outside = set(range(fewest, most + 1))
     for special in found:
         if special.kind == "GR":
             continue
@@ -71,7 +65,8 @@ def accounted(a: Orbit, found: list[SpecialPoint], b: Orbit) -> bool:
         size = crossing.size
         others = _possible_outside(np.delete(mu, crossing))
         outside = {n + size for n in others & outside} | {n for n in others if n + size in outside}
-    return bool(outside & _possible_outside(b.multipliers))
+    fewest, most = b.critical.outside
+    return bool(outside & set(range(fewest, most + 1)))
 
 
 def _possible_outside(multipliers: Complex) -> set[int]:
@@ -80,24 +75,18 @@ def _possible_outside(multipliers: Complex) -> set[int]:
     return set(range(fewest, most + 1))
 
 
-def leaves_circle(before: Complex, after: Complex) -> bool:
+def leaves_circle(a: Orbit, b: Orbit) -> bool:
     """Whether the pair nearest to the unit circle lies beside it at one of two orbits.
 
     The pair of a mode without damping stays on it, where the torus test is rounding noise.
     """
-    return any(_pair_off_circle(mu)[1] > ON_CIRCLE for mu in (before, after))
+    return max(a.critical.off, b.critical.off) > ON_CIRCLE
 
 
-def _pair_off_circle(multipliers: Complex) -> tuple[complex, float]:
-    """One of the two multipliers whose product is nearest to 1, and how far that is from 1."""
-    index, off = nearest_pair(multipliers)
-    return complex(multipliers[index]), off
-
-
-def _on_unit_circle(multipliers: Complex) -> bool:
+def _on_unit_circle(orbit: Orbit) -> bool:
     """Whether a complex pair (not a real pair μ, 1/μ) is what makes the torus test vanish."""
-    mu = _pair_off_circle(multipliers)[0]
-    return bool(abs(mu.imag) > COMPLEX * abs(mu))
+    mu = complex(orbit.multipliers[orbit.critical.pair])
+    return abs(mu.imag) > COMPLEX * abs(mu)
 
 
 def changed(a: BranchNode, b: BranchNode) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -29,30 +30,21 @@ class Touch:
 
     def depth(self, point: BranchNode) -> float:
         """Value of the extremum of this kind nearest in phase."""
-        found = point.orbit.touches(self.output)
-        full = 2.0 * math.pi * point.orbit.period
-        index = nearest(found.phases, found.is_maximum, self.is_maximum, self.phase, full)
+        found, full = point.orbit.touched, 2.0 * math.pi * point.orbit.period
+        index = nearest(found, 2 * self.output + self.is_maximum, self.phase, full)
         if index < 0:
             raise LocateError("an extreme has vanished")
-        return float(found.values[index])
+        return float(found[index, 1])
 
 
-def touching_extremes(a: Orbit, b: Orbit) -> list[Touch]:
+@lru_cache(maxsize=4)  # of a step it is asked for by all that look into it
+def touching_extremes(a: Orbit, b: Orbit) -> tuple[Touch, ...]:
     """Extremes of the penetrations that change sign between two neighbouring orbits.
 
     A maximum that becomes positive is a new contact; a minimum that becomes negative splits one.
     """
-    touches = []
-    full = 2.0 * math.pi * a.period
-    for output in range(len(a.system.stops)):
-        first, last = a.touches(output), b.touches(output)
-        kinds, phases = sign_changes(
-            *(first.phases, first.values, first.is_maximum),
-            *(last.phases, last.values, last.is_maximum),
-            full,
-        )
-        touches += [Touch(output, bool(k), float(p)) for k, p in zip(kinds, phases, strict=True)]
-    return touches
+    changes = sign_changes(a.touched, b.touched, len(a.system.stops), 2.0 * math.pi * a.period)
+    return tuple(Touch(int(key) // 2, key % 2 == 1, phase) for key, phase in changes)
 
 
 def changes_hidden_by_birth(a: Orbit, b: Orbit) -> bool:
@@ -62,16 +54,13 @@ def changes_hidden_by_birth(a: Orbit, b: Orbit) -> bool:
     stop before the next point: a new contact and its union with another one, after which there are
     as many contacts as before.
     """
-    full = 2.0 * math.pi * a.period
-    for output in range(len(a.system.stops)):
-        first, last = a.touches(output), b.touches(output)
-        if first.phases.size == last.phases.size:
+    for output, (count, other) in enumerate(zip(a.touch_counts, b.touch_counts, strict=True)):
+        if count == other:
             continue
-        fewer = a
-        if first.phases.size > last.phases.size:
-            fewer, first, last = b, last, first
-        new = alone(first.phases, first.is_maximum, last.phases, last.is_maximum, full)
-        if np.any(last.values[new] * fewer.penetration(output, last.phases[new]) < 0.0):
+        fewer, more = (a, b) if count < other else (b, a)
+        first, last = (orbit.touched[orbit.touched[:, 2] // 2 == output] for orbit in (fewer, more))
+        new = last[alone(first, last, 2.0 * math.pi * a.period)]
+        if np.any(new[:, 1] * fewer.penetration(output, new[:, 0]) < 0.0):
             return True
     return False
 

@@ -17,7 +17,7 @@ from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.sign_changes import changed, leaves_circle, tests
 from nldyn.bifurcations.touching import touches_sharply, touching_extremes
 from nldyn.orbits.critical_functions import travel
-from nldyn.orbits.extremes import dip, extreme_dip
+from nldyn.orbits.extremes import dips
 from nldyn.orbits.impact_phases import impacts_by_segment
 from nldyn.orbits.shooting import metric_length
 
@@ -80,7 +80,7 @@ def passes_node(a: BranchNode, b: BranchNode) -> bool:
     """
     if not a.orbit.system.jumps:
         return False
-    way = metric_length(a.family.metric(a.point), b.point - a.point)
+    way = metric_length(a.weights, b.point - a.point)
     if way > MOST_BENT * abs(b.arclength - a.arclength):
         return True
     return bool((impacts_by_segment(a.orbit) != impacts_by_segment(b.orbit)).any())
@@ -95,16 +95,16 @@ def may_hide(z: BranchNode | None, a: BranchNode, b: BranchNode, c: BranchNode |
     """
     before, after = a.orbit.multipliers, b.orbit.multipliers
     far = FAR if before.size > 2 else FAR_ALONE
-    if max(travel(before, after), travel(after, before)) > far:
+    if travel(before, after) > far:
         return True
     low, high = sorted((a.arclength, b.arclength))
     for triple in ((z, a, b), (a, b, c)):
         if any(p is None for p in triple):
             continue
-        dips = hidden_dips(*(p for p in triple if p is not None))
+        places = hidden_dips(*(p for p in triple if p is not None))
         if any(p.orbit.rests for p in triple if p is not None):
-            dips = dips[: len(tests(a))]
-        if any(low < where < high for where in dips):
+            places = places[: len(tests(a))]
+        if any(low < where < high for where in places):
             return True
     return False
 
@@ -171,7 +171,7 @@ def smooth(a: BranchNode, b: BranchNode) -> bool:
     """Whether multipliers may be interpolated between two points, and can cross the circle."""
     if a.orbit.system.conservative or a.orbit.impacts != b.orbit.impacts:
         return False
-    return leaves_circle(a.orbit.multipliers, b.orbit.multipliers)
+    return leaves_circle(a.orbit, b.orbit)
 
 
 def looked_into(
@@ -210,7 +210,7 @@ def looked_into(
 def resolved(a: BranchNode, b: BranchNode, least: int, most: int, far: float) -> list[BranchNode]:
     """Points between two others, halved at least so often, until no multiplier moves far."""
     before, after = a.orbit.multipliers, b.orbit.multipliers
-    if most == 0 or (least <= 0 and max(travel(before, after), travel(after, before)) <= far):
+    if most == 0 or (least <= 0 and travel(before, after) <= far):
         return []
     middle = Chord(a, b).at(0.5)
     first = resolved(a, middle, least - 1, most - 1, far)
@@ -221,6 +221,8 @@ def insert_dip(points: list[BranchNode], index: int) -> None:
     """Add a point beside one where a test or an extreme may have changed sign twice unseen."""
     z, a, b = points[index - 1 : index + 2]
     for number, where in enumerate(hidden_dips(z, a, b)):
+        if math.isnan(where):
+            continue
         try:
             extra = turned_over(z, a, b, number, where)
         except LocateError:  # met again when the step is searched
@@ -269,16 +271,17 @@ def turned_over(
 def hidden_dips(z: BranchNode, a: BranchNode, b: BranchNode) -> tuple[float, ...]:
     """Arclengths between z and b at which a test or an extreme may touch zero unseen.
 
-    See `orbits.extremes.dip`; the extremes are those of the stops' penetrations.
+    See `orbits.extremes.dips`; the extremes are those of the stops' penetrations.
     """
     left, right = z.arclength - a.arclength, b.arclength - a.arclength
-    before, here, after = tests(z), tests(a), tests(b)
-    found = [dip(left, right, before[kind], here[kind], after[kind]) for kind in here]
-    full = 2.0 * math.pi * a.orbit.period
-    for output in range(len(a.orbit.system.stops)):
-        beside = (point.orbit.touches(output) for point in (z, a, b))
-        first, middle, last = [(e.phases, e.values, e.is_maximum) for e in beside]
-        found.append(extreme_dip(left, right, first, middle, last, full))
+    found = dips(
+        left,
+        right,
+        [value for point in (z, a, b) for value in tests(point).values()],
+        len(a.orbit.system.stops),
+        [point.orbit.touched for point in (z, a, b)],
+        2.0 * math.pi * a.orbit.period,
+    )
     return tuple(a.arclength + way for way in found)
 
 

@@ -171,7 +171,7 @@ class Stepper:
             there.orbit.impacts != here.orbit.impacts or there.orbit.system.jumps
         )
         bent = bent or passes_node(here, there) or bool(there.corner or made.way[0].corner)
-        trail = np.vstack([here.point, here.tangent, self.stride.behind])
+        trail = np.concatenate([here.point[None], here.tangent[None], self.stride.behind])
         behind = trail[: 0 if bent else 2 * MOST_BEHIND]
         step = self.options.next_step(step, made.angle, made.miss)
         self.stride = StepperState(there, step, behind, self.stride.count + 1)
@@ -310,7 +310,7 @@ class Stepper:
         up to `SHORTEST_CROSSING` or `MEETING_STEP`, or `crossing` if that is longer.
         """
         family = here.family
-        weights = family.metric(here.point)
+        weights = here.weights
         direction = here.tangent / metric_length(weights, here.tangent)
         straight = here.point + step * direction
         row = weights * direction
@@ -417,7 +417,7 @@ class Stepper:
         family = here.family
         if family.in_frequency_alone:
             return None
-        weights, values = family.metric(here.point), here.values.tolist()
+        weights, values = here.weights, here.values.tolist()
         for which, (chart, limits) in enumerate(zip(family.charts, self._ranges, strict=True)):
             place = family.n_states + which
             slope = float(here.tangent[place])
@@ -546,11 +546,13 @@ class Stepper:
         start = self.start
         if b.arclength - start.arclength < 3.0 * (b.arclength - a.arclength):
             return False
+        if not _near(a, b, start.point):  # nor is a shift, whose parameter is the same
+            return False
         places, tangents = self._shifts
         passed = _passed(a, b, places)
-        if not passed.any():
+        if not np.count_nonzero(passed):
             return False
-        step = start.family.metric(start.point) * (b.point - a.point)
+        step = start.weights * (b.point - a.point)
         return bool((tangents[passed] @ step > 0.0).any())
 
     def _comes_back(self, a: BranchNode, b: BranchNode) -> bool:
@@ -563,9 +565,9 @@ class Stepper:
         for point in self.visited[len(self._places.so_far()) :]:
             self._places.add(point.point)
         passed = _passed(a, b, self._places.so_far()[:-RECENT])
-        if not passed.any():
+        if not np.count_nonzero(passed):
             return False
-        weights, step = a.family.metric(a.point), b.point - a.point
+        weights, step = a.weights, b.point - a.point
         length2 = float(step @ (weights * step))
         for index in np.flatnonzero(passed):
             place, tangent = self.visited[index].point, self.visited[index].tangent
@@ -614,19 +616,24 @@ def _rounding(here: BranchNode) -> float:
     return EPS * float(values[0] / max(values[-1], TINY))
 
 
+def _near(a: BranchNode, b: BranchNode, place: Real) -> bool:
+    """Whether the parameter of a place is as near as the step from a to b is long."""
+    length = metric_length(a.weights, b.point - a.point)
+    return abs(float(place[-1] - a.point[-1])) <= ROOM * length
+
+
 def _passed(a: BranchNode, b: BranchNode, places: Real) -> NDArray[np.bool_]:
     """Which places (m, N + 1) lie beside the step from a to b, nearer than 0.1 of its length.
 
     None do where an impact passes a phase of shooting: the state jumps there.
     """
-    if passes_node(a, b):
-        return np.zeros(len(places), dtype=bool)
-    start, step = a.point, b.point - a.point
-    weights = a.family.metric(start)
-    length2 = float(step @ (weights * step))
     passed = np.zeros(len(places), dtype=bool)
+    if not passed.size or passes_node(a, b):
+        return passed
+    start, step, weights = a.point, b.point - a.point, a.weights
+    length2 = float(step @ (weights * step))
     near = np.abs(places[:, -1] - start[-1]) <= ROOM * math.sqrt(length2)  # few are
-    if near.any():
+    if np.count_nonzero(near):
         way = places[near] - start
         along = way @ (weights * step)
         off = way - np.outer(along / length2, step)

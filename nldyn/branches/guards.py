@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.bordered import FREE, Condition, Corrected, OrbitFamily, length_unit
 from nldyn.orbits.conditions import TOUCH, Grazing, Singular
 from nldyn.orbits.orbit import Orbit
-from nldyn.orbits.shooting import BROKEN, asymmetry, metric_length, shifts
+from nldyn.orbits.shooting import BROKEN, metric_length, shifts
 
 KINK = TOUCH  # step below which a branch may bend by any angle where the number of contacts changes
 BY_TOLERANCE = 1.0  # asymmetry over the tolerance of the flow map: its error (0.3 at most seen)
@@ -73,10 +73,10 @@ class Attempt:
     crossing: float = 0.0
     looked: bool = False
 
-    @cached_property
+    @property
     def weights(self) -> Real:
         """Metric where the step begins."""
-        return self.here.family.metric(self.here.point)
+        return self.here.weights
 
     @property
     def free(self) -> bool:
@@ -149,8 +149,8 @@ def jumped(attempt: Attempt) -> str:
 
 def mends(attempt: Attempt) -> str:
     """A broken symmetry is whole again; along a curve rounding may break it."""
-    family, here, there = attempt.here.family, attempt.here.point, attempt.found.point
-    mended = attempt.free and mends_symmetry(family, here, there)
+    here, there = attempt.here, attempt.there
+    mended = attempt.free and mends_symmetry(here.family, here.asymmetry, there.asymmetry)
     return _told("the next orbit is a symmetric one", mended)
 
 
@@ -244,15 +244,38 @@ def ends_on_crossing(attempt: Attempt) -> str:
     return _told("another branch crosses at the next point", on)
 
 
-OF_ORBITS: Sequence[Guard] = (no_orbit, mends, jumped, changes_impacts, bends_at_rigid_grazing)
-OF_SMOOTH_STEPS: Sequence[Guard] = (
-    misses, is_off, turns, changes_pair, touches, meets_flip, crosses_branch, ends_on_crossing,
-)  # fmt: skip
+@lru_cache(maxsize=16)
+def guards_of(free: bool, rigid: bool, period: int) -> tuple[Sequence[Guard], Sequence[Guard]]:
+    """Guards that may object: those of all steps, and further ones of smooth steps.
+
+    Parameters
+    ----------
+    free : bool
+        Whether orbits meet no condition.
+    rigid : bool
+        Whether there are rigid stops.
+    period : int
+        That of the orbits.
+    """
+    of_orbits = (
+        (no_orbit, True), (mends, free), (jumped, period > 1), (changes_impacts, rigid),
+        (bends_at_rigid_grazing, rigid),
+    )  # fmt: skip
+    of_smooth_steps = (
+        (misses, True), (is_off, True), (turns, True), (changes_pair, not free), (touches, True),
+        (meets_flip, period % 2 == 0), (crosses_branch, free), (ends_on_crossing, free),
+    )  # fmt: skip
+    first, further = (
+        tuple(guard for guard, may_object in guards if may_object)
+        for guards in (of_orbits, of_smooth_steps)
+    )
+    return first, further
 
 
 def in_the_way(attempt: Attempt) -> tuple[Guard, str] | None:
     """The first guard that objects, and what is in the way; None if none does."""
-    for guards in (OF_ORBITS, OF_SMOOTH_STEPS):
+    family = attempt.here.family
+    for guards in guards_of(attempt.free, bool(family.system.rigid_stops), family.period):
         for guard in guards:
             if obstacle := guard(attempt):
                 return guard, obstacle
@@ -308,11 +331,10 @@ def rubs_all_around(orbit: Orbit) -> bool:
     return bool(depth[:, list(orbit.system.round_stops)].any())
 
 
-def mends_symmetry(family: OrbitFamily, here: Real, there: Real) -> bool:
+def mends_symmetry(family: OrbitFamily, before: float, after: float) -> bool:
     """Whether a step from an orbit of broken symmetry has landed on a symmetric one."""
-    broken = asymmetry(family.problem, here)
     least = max(BROKEN, BY_TOLERANCE * family.options.rtol)
-    return broken > least and asymmetry(family.problem, there) < EQUAL_HALVES * broken
+    return before > least and after < EQUAL_HALVES * before
 
 
 def is_shifted(family: OrbitFamily, here: Real, guess: Real, there: Real) -> bool:

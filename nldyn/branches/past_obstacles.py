@@ -29,7 +29,7 @@ from nldyn.orbits.impact_phases import (
     nodes_to_impacts,
     start_far_from_impacts,
 )
-from nldyn.orbits.shooting import FROM_NEAR, metric_length
+from nldyn.orbits.shooting import FROM_NEAR, asymmetry, metric_length
 
 LONGER_CROSSINGS = (1.0, 10.0, 100.0)  # steps from a crossing, over `SHORTEST_CROSSING`
 FARTHEST_CROSSING = 1e-4  # distance of one from which a step may begin
@@ -174,7 +174,8 @@ def across_touch(here: BranchNode, step: float, row: Real) -> Advance | None:
     weights = family.metric(here.point)
     guess = here.point + step * here.tangent / metric_length(weights, here.tangent)
     found = correct(family, guess, FREE, row, longest=2.0 * KINK, max_iterations=FROM_NEAR)
-    if not found.converged or mends_symmetry(family, here.point, found.point):
+    after = asymmetry(family.problem, found.point)
+    if not found.converged or mends_symmetry(family, here.asymmetry, after):
         return None
     if is_shifted(family, here.point, guess, found.point):
         return None

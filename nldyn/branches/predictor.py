@@ -7,8 +7,8 @@ import ctypes
 import numpy as np
 
 from nldyn.base.arrays import Real
-from nldyn.engine.library import address_of, function
-from nldyn.engine.numbers import reals
+from nldyn.engine.library import function
+from nldyn.engine.numbers import address_of, reals
 
 _WHOLE, _POINTER = ctypes.c_int64, ctypes.c_void_p
 _predicted = function(

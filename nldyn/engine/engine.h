@@ -135,16 +135,25 @@ typedef struct {
     const double *to_fine;     /* (m + 2, n_fine) */
 } Gauss;
 
-/* Pieces of a trajectory, see layout.py. used: pieces in use; the first of those of a motion
- * before that are still ahead (they stand at the end); whether these are of another orbit. */
+/* Pieces of a trajectory, see layout.py: rows of one block, whose first row tells how many are in
+ * use. */
 typedef struct {
-    int64_t capacity;
-    double *phase, *duration;
-    int64_t *kind, *event;
-    double *start;         /* (capacity, 2n) */
-    double *force, *depth; /* (capacity, n_stops, m) */
-    int64_t *used;         /* (3,) */
+    int64_t capacity, width; /* numbers in a row */
+    double *block;           /* (1 + capacity, width) */
 } Record;
+
+/* A piece: forcing phase at its start, duration, kind, stop that opens or closes at its end or -1,
+ * state (2n,) at its start; then forces and penetrations (n_stops, m) each. */
+typedef struct {
+    double phase, duration, kind, event, start[];
+} Recorded;
+
+static inline Recorded *recorded(const Record *rec, int64_t n)
+{
+    return (Recorded *)(rec->block + (size_t)(1 + n) * rec->width);
+}
+
+static inline int64_t n_recorded(const Record *rec) { return (int64_t)rec->block[0]; }
 
 /* kinds of terms of a response: e^{imωt}; the growth from rest e' = λe + e^{imωt}; and for a slow
  * block A of a trace and determinant the functions of ∫exp(As) ds = e + e_on A from 0 to t */
@@ -241,6 +250,8 @@ typedef struct {
     const Flow *fl;
     const Gauss *tab;
     Record *rec;
+    int64_t ahead; /* the first of the pieces of a motion before, at the record's end, not passed */
+    bool other;    /* whether these are of another orbit */
     Panel *panel;
     Scratch *s;
     bool with_columns, recording;
@@ -267,6 +278,12 @@ typedef struct {
 typedef struct {
     double value, first, second, bound;
 } Course;
+
+/* A local extreme of a penetration, or another output: its key is twice the number of the stop, for a
+ * maximum one more; `output` is the penetration with the gap. */
+typedef struct {
+    double phase, value, key, output;
+} Extreme;
 
 /* force of a stop and its derivatives by penetration and speed */
 typedef struct {
@@ -298,6 +315,17 @@ static inline Complex forced_of(const Flow *fl, int term, int row, int out)
 static inline const Complex *response_of(const Flow *fl, int term, int row)
 {
     return fl->response + ((size_t)term * (2 + fl->n_parameters) + row) * fl->size;
+}
+
+/* forces (n_stops, m) of a recorded piece, and its penetrations */
+static inline double *forces_of(const Flow *fl, const Recorded *piece)
+{
+    return (double *)piece->start + fl->size;
+}
+
+static inline double *depths_of(const Flow *fl, int m, const Recorded *piece)
+{
+    return forces_of(fl, piece) + (size_t)fl->n_stops * m;
 }
 
 static inline double *piece_row(double *values, int a, int width) { return values + (size_t)a * width; }

@@ -166,6 +166,21 @@ static void fly_state(const double *blocks, int n, double *w, double t)
     }
 }
 
+/* move a pair of coordinates */
+static void move_pair(Square by, double *pair)
+{
+    double x = pair[0], y = pair[1];
+    pair[0] = by.a * x + by.b * y;
+    pair[1] = by.c * x + by.d * y;
+}
+
+/* product of two matrices */
+static Square times(Square a, Square b)
+{
+    return (Square){a.a * b.a + a.b * b.c, a.a * b.b + a.b * b.d, a.c * b.a + a.d * b.c,
+                    a.c * b.b + a.d * b.d};
+}
+
 /* advance sensitivities (2n, n_columns) in place by a flight of duration t */
 static void fly_columns(const double *blocks, int n, double *columns, int n_columns, double t)
 {

@@ -5,6 +5,7 @@
 #define PER_HALF_WAVE 8.0 /* samples of the fastest motion that is seen, between which is sought */
 #define SOON 1e-6 /* of the time to the next sample: a difference over it is the slope of a rate */
 #define MOST_SAMPLES 3000000 /* of a piece, in which no more extremes are told */
+#define RENEWED 64 /* samples from which on exponentials are computed anew, not by those before */
 #define KEPT_WEIGHTS 1024 /* samples of a panel whose weights are kept for the next panel */
 
 /* row . w + Re Σ forced e(t), of all terms of the response and of a base on which it rides */
@@ -23,22 +24,24 @@ typedef struct {
     int n_terms;
     Term *terms;
     double *w, *v, *weights, *fresh;
-    Square *steps; /* (n,) exponentials over a sample of a flight */
+    Square *steps, *now; /* (n,) exponentials over a sample, and from the start to the one at hand */
+    Complex turn, turn_step; /* e^{iωt} at the sample at hand, and over a sample */
     int64_t n_samples, kept; /* of the piece at hand; with which `weights` were made */
     int sign, first_sign;
     double first_value;
     double t_old, rate_old, t_older, rate_older;
-    double *found; /* (capacity, 3) */
+    Extreme *found; /* (capacity,) */
     int64_t capacity, count;
 } Search;
 
 /* value and rate (slope) of a displacement, with the homogeneous state w, a time t after the start
- * of the piece */
-static Value moving_rate(const Search *S, const Moving *moving, double t, const double *w)
+ * of the piece, where the excitation is at e^{iωt} = turn */
+static Value moving_rate(const Search *S, const Moving *moving, double t, Complex turn,
+                         const double *w)
 {
     double omega = S->fl.omega, phase = S->piece.phase + omega * t;
-    Complex turn = product(moving->forced[0], turned(phase));
-    Value found = {turn.re, -omega * turn.im};
+    Complex swing = product(moving->forced[0], turn);
+    Value found = {swing.re, -omega * swing.im};
     for (int k = 0; k < S->n_terms; k++) {
         TermCourse e = term_since(S->terms + k, omega, phase, t);
         found.value += product(moving->forced[1 + k], e.value).re;
@@ -53,11 +56,11 @@ static Value moving_rate(const Search *S, const Moving *moving, double t, const 
 
 /* the same of the output; of a round clearance the distance from its centre, positive within a ring,
  * and what changes its sign with its rate, smooth at the centre */
-static Value output_rate(const Search *S, double t, const double *w)
+static Value output_rate(const Search *S, double t, Complex turn, const double *w)
 {
-    Value first = moving_rate(S, S->moving, t, w);
+    Value first = moving_rate(S, S->moving, t, turn, w);
     if (!S->round) return first;
-    Value second = moving_rate(S, S->moving + 1, t, w);
+    Value second = moving_rate(S, S->moving + 1, t, turn, w);
     double x = first.value - S->round->centre;
     double y = second.value - stop_of(&S->fl, (int)S->round->second)->centre;
     double share = S->round->sense / S->round->gap;
@@ -68,16 +71,13 @@ static Value output_rate(const Search *S, double t, const double *w)
 static Value output_rate_at(Search *S, double t)
 {
     state_at(&S->piece, t, S->v);
-    return output_rate(S, t, S->v);
+    return output_rate(S, t, turned(S->piece.phase + S->fl.omega * t), S->v);
 }
 
 static void append_extreme(Search *S, double phase, double value, int sign)
 {
     if (S->count < S->capacity) {
-        double *row = S->found + 3 * S->count;
-        row[0] = phase;
-        row[1] = value;
-        row[2] = sign;
+        S->found[S->count] = (Extreme){phase, value, sign > 0, value};
     }
     S->count++;
 }
@@ -193,16 +193,39 @@ static double leave_unseen(Search *S)
     return fastest;
 }
 
-/* homogeneous state at sample i of a flight */
-static void next_in_flight(Search *S, int64_t i)
+/* Homogeneous state at sample i of a flight, which from time to time is computed anew: a sum of many
+ * roundings. */
+static void next_in_flight(Search *S, int64_t i, double t)
 {
     double *w = S->w;
-    for (int b = 0; b < S->fl.n; b++) {
-        double x = w[2 * b], y = w[2 * b + 1];
-        w[2 * b] = i == 0 ? S->piece.start[2 * b] : S->steps[b].a * x + S->steps[b].b * y;
-        w[2 * b + 1] =
-            i == 0 ? S->piece.start[2 * b + 1] : S->steps[b].c * x + S->steps[b].d * y;
+    if (i % RENEWED == 0) {
+        state_at(&S->piece, t, w);
+        return;
     }
+    for (int b = 0; b < S->fl.n; b++) move_pair(S->steps[b], w + 2 * b);
+}
+
+/* the same of a panel, with the weights of the nodes up to the sample */
+static void next_in_contact(Search *S, const double *weights, int64_t i, double t)
+{
+    if (S->piece.kind != 0) { /* its samples do not lie evenly */
+        state_in_contact(&S->piece, weights, t, S->w);
+        return;
+    }
+    carried_back(&S->piece, weights, S->w);
+    for (int b = 0; b < S->fl.n; b++) {
+        bool anew = i % RENEWED == 0;
+        S->now[b] = anew ? block_exponential(block_of(&S->fl, b), t) : times(S->steps[b], S->now[b]);
+        move_pair(S->now[b], S->w + 2 * b);
+    }
+}
+
+/* e^{iωt} at sample i */
+static Complex next_turn(const Search *S, int64_t i, double t)
+{
+    bool evenly = S->piece.kind <= 0;
+    if (evenly && i % RENEWED != 0) return product(S->turn, S->turn_step);
+    return turned(S->piece.phase + S->fl.omega * t);
 }
 
 /* fill the weights of the nodes up to the samples of a panel, unless those at hand fit */
@@ -225,7 +248,7 @@ static const double *weights_at(Search *S, int64_t i)
 /* look at the sample i of a piece, at time t, and between it and those before */
 static void look_at(Search *S, int64_t n, int64_t i, double t)
 {
-    Value at = output_rate(S, t, S->w);
+    Value at = output_rate(S, t, S->turn, S->w);
     int sign = at.slope > 0.0 ? 1 : at.slope < 0.0 ? -1 : S->sign;
     if (n == 0 && i == 0) S->first_value = at.value;
     if (S->first_sign == 0) S->first_sign = S->sign = sign;
@@ -258,16 +281,19 @@ static void search_piece(Search *S, const Record *rec, int64_t n, double moved)
     int64_t count = wanted < MOST_SAMPLES ? (int64_t)wanted : MOST_SAMPLES; /* also of nan */
     S->n_samples = larger_index(count, 0) + 1 + (flight ? 0 : tab->m);
     if (!flight) make_weights(S);
-    for (int b = 0; flight && b < S->fl.n; b++)
-        S->steps[b] = block_exponential(block_of(&S->fl, b), piece->h / (double)S->n_samples);
+    double step = piece->h / (double)S->n_samples;
+    for (int b = 0; piece->kind <= 0 && b < S->fl.n; b++)
+        S->steps[b] = block_exponential(block_of(&S->fl, b), step);
+    S->turn_step = turned(S->fl.omega * step);
     for (int64_t i = 0; i <= S->n_samples; i++) {
         if (i % 1024 == 1023 && interrupted(&S->watch)) return;
         double x = (double)i / (double)S->n_samples;
         double t = piece->h * (flight ? x : map_fraction(tab, piece->kind, x));
         if (flight)
-            next_in_flight(S, i);
+            next_in_flight(S, i, t);
         else
-            state_in_contact(piece, weights_at(S, i), t, S->w);
+            next_in_contact(S, weights_at(S, i), i, t);
+        S->turn = next_turn(S, i, t);
         look_at(S, n, i, t);
     }
 }
@@ -286,6 +312,7 @@ static void lay_out_search(Block *block, const System *sys, const Gauss *tab, si
     S->weights = numbers(block, (size_t)(KEPT_WEIGHTS + 1) * tab->m);
     S->fresh = numbers(block, tab->m);
     S->steps = room(block, S->fl.n, sizeof(Square));
+    S->now = room(block, S->fl.n, sizeof(Square));
 }
 
 /* the terms of the output: those of the response, and Σ Re(amplitudes e^{i orders ωt}) of a base */
@@ -294,6 +321,8 @@ static void begin_output(Search *S, int out, int64_t more, const double *orders,
 {
     const Flow *fl = &S->fl;
     S->round = out < fl->n_stops && is_round(fl, out) ? stop_of(fl, out) : NULL;
+    S->sign = S->first_sign = 0;
+    S->first_value = S->t_old = S->rate_old = S->t_older = S->rate_older = 0.0;
     int rows[2] = {out, S->round ? (int)S->round->second : out};
     S->n_terms = fl->n_terms + (int)more;
     for (int p = 0; p < fl->n_terms; p++) S->terms[p] = fl->terms[p];
@@ -309,8 +338,35 @@ static void begin_output(Search *S, int out, int64_t more, const double *orders,
     }
 }
 
-/* Fill phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output,
- * (capacity, 3); `count` tells how many there are, also of those that had no room.
+/* search an output from the start of a motion to its end; `moved` is the fastest motion in contact */
+static void search_output(Search *S, const Record *rec, double moved)
+{
+    for (int64_t n = 0; n < n_recorded(rec) && !S->watch.stopped; n++) {
+        search_piece(S, rec, n, moved);
+        interrupted(&S->watch);
+    }
+    if (S->sign != S->first_sign)
+        append_extreme(S, recorded(rec, 0)->phase, S->first_value, S->sign);
+}
+
+/* begin a search with memory of its own, which is none if there was none left */
+static char *begin_search(const Host *host, const System *sys, const Gauss *tab, double omega,
+                          int64_t more, Search *S)
+{
+    Block block = {NULL, 0};
+    lay_out_search(&block, sys, tab, more, S);
+    char *memory = malloc(block.used);
+    if (!memory) return NULL;
+    block = (Block){memory, 0};
+    lay_out_search(&block, sys, tab, more, S);
+    begin_watch(&S->watch, host);
+    S->fl.watch = &S->watch;
+    at_frequency(sys, omega, NULL, &S->fl);
+    return memory;
+}
+
+/* Fill all local extremes (capacity,) of an output, each with a key of its own kind: 1 for a maximum,
+ * else 0. How many there are, also of those that had no room, or -1 without memory.
  *
  * The rate is sampled sixteen times per period of the fastest mode that `leave_unseen` leaves, or
  * that stops move in contact; its sign changes are refined. In flight, where a parabola through
@@ -320,27 +376,46 @@ static void begin_output(Search *S, int out, int64_t more, const double *orders,
 EXPORT int64_t nldyn_local_extremes(const Host *host, const System *sys, const Gauss *tab,
                                     const Record *rec, double omega, int64_t out, int64_t more,
                                     const double *orders, const Complex *amplitudes,
-                                    int64_t capacity, double *found, int64_t *count)
+                                    int64_t capacity, Extreme *found)
 {
     Search S = {.found = found, .capacity = capacity, .kept = -1};
-    Block block = {NULL, 0};
-    lay_out_search(&block, sys, tab, more, &S);
-    char *memory = malloc(block.used);
-    if (!memory) return OUT_OF_MEMORY;
-    block = (Block){memory, 0};
-    lay_out_search(&block, sys, tab, more, &S);
-    begin_watch(&S.watch, host);
-    S.fl.watch = &S.watch;
-    at_frequency(sys, omega, NULL, &S.fl);
+    char *memory = begin_search(host, sys, tab, omega, more, &S);
+    if (!memory) return -1;
     begin_output(&S, (int)out, more, orders, amplitudes);
-    double moved = fastest_moved(sys);
-    for (int64_t n = 0; n < rec->used[0] && !S.watch.stopped; n++) {
-        search_piece(&S, rec, n, moved);
-        interrupted(&S.watch);
-    }
-    if (S.sign != S.first_sign) append_extreme(&S, rec->phase[0], S.first_value, S.sign);
-    *count = S.count;
+    search_output(&S, rec, fastest_moved(sys));
     end_watch(&S.watch);
     free(memory);
-    return S.watch.stopped ? INTERRUPTED : OK;
+    return S.count;
+}
+
+/* Fill the local extremes (capacity,) of the penetrations of the first stops, whose gaps (n_stops,)
+ * are taken off, one stop after the other, with keys of the stops, see `Extreme`; and for each stop
+ * (n_stops,) how many of these are shallow: within a share of its largest. How many there are, also
+ * of those that had no room, or -1 without memory. */
+EXPORT int64_t nldyn_touches(const Host *host, const System *sys, const Gauss *tab,
+                             const Record *rec, double omega, int64_t n_stops, const double *gaps,
+                             double share, int64_t capacity, Extreme *found, int64_t *shallow)
+{
+    Search S = {.found = found, .capacity = capacity, .kept = -1};
+    char *memory = begin_search(host, sys, tab, omega, 0, &S);
+    if (!memory) return -1;
+    double moved = fastest_moved(sys);
+    for (int64_t stop = 0; stop < n_stops; stop++) {
+        int64_t before = S.count;
+        double deepest = 0.0;
+        begin_output(&S, (int)stop, 0, NULL, NULL);
+        search_output(&S, rec, moved);
+        int64_t end = S.count < capacity ? S.count : capacity;
+        for (int64_t i = before; i < end; i++) {
+            found[i].value = found[i].output - gaps[stop];
+            found[i].key += (double)(2 * stop);
+            deepest = larger(deepest, fabs(found[i].value));
+        }
+        shallow[stop] = 0;
+        for (int64_t i = before; i < end; i++)
+            shallow[stop] += fabs(found[i].value) <= share * deepest;
+    }
+    end_watch(&S.watch);
+    free(memory);
+    return S.count;
 }

@@ -246,41 +246,43 @@ static Choice guess_panel(const Flow *fl, const Gauss *tab, double phase, const 
 }
 
 /* the recorded panel of a motion before at this phase */
-static int64_t panel_before(const Flow *fl, Record *rec, double phase)
+static int64_t panel_before(Motion *M, double phase)
 {
-    int64_t n = rec->used[1];
-    while (n < rec->capacity && rec->phase[n] + 0.5 * fl->omega * rec->duration[n] < phase) n++;
-    return rec->used[1] = n;
+    for (; M->ahead < M->rec->capacity; M->ahead++) {
+        const Recorded *piece = recorded(M->rec, M->ahead);
+        if (piece->phase + 0.5 * M->fl->omega * piece->duration >= phase) break;
+    }
+    return M->ahead;
 }
 
 /* Kind, length and event of a panel to try first; fills the penetrations.
  *
- * The panel of a motion before serves, if it has one there. Of another orbit (`used[2]`) only one
+ * The panel of a motion before serves, if it has one there. Of another orbit only one
  * of the kind that the state asks for does, and its length only if it ends with an event: lengths
  * that are handed on from orbit to orbit would become shorter and shorter. */
 static Choice first_panel(Motion *M, double phase, double h_max)
 {
     const Flow *fl = M->fl;
-    Record *rec = M->rec;
     Panel *panel = M->panel;
     int m = panel->m;
-    int64_t n = panel_before(fl, rec, M->before + phase);
-    const double *depth = rec->depth + (size_t)n * fl->n_stops * m;
-    bool other = rec->used[2] == 1;
-    bool known = n < rec->capacity && rec->kind[n] != FLIGHT && rec->kind[n] / 2 == M->start_switch;
+    int64_t n = panel_before(M, M->before + phase);
+    const Recorded *before = recorded(M->rec, n);
+    const double *depth = depths_of(fl, m, before);
+    bool known = n < M->rec->capacity && before->kind != FLIGHT &&
+                 (int)before->kind / 2 == M->start_switch;
     for (int a = 0; a < panel->na && known; a++)
         known = largest(depth + (size_t)panel->active[a] * m, m) > 0.0;
     Choice guessed = {-1, -1, 0.0};
-    if (other || !known) {
+    if (M->other || !known) {
         guessed = guess_panel(fl, M->tab, phase, M->w, h_max, M->h_mapped, M->start_switch, panel);
-        known = known && guessed.kind == rec->kind[n];
+        known = known && guessed.kind == (int)before->kind;
     }
     if (!known) return guessed;
     for (int a = 0; a < panel->na; a++)
         for (int i = 0; i < m; i++)
             panel->output[a * m + i] = depth[(size_t)panel->active[a] * m + i];
-    Choice found = {(int)rec->kind[n], (int)rec->event[n], rec->duration[n]};
-    if (other && found.event < 0) {
+    Choice found = {(int)before->kind, (int)before->event, before->duration};
+    if (M->other && found.event < 0) {
         for (int a = 0; a < panel->na; a++)
             if (is_bond(fl, panel->active[a])) hold_still(fl, phase, M->w, a, panel);
         return (Choice){found.kind, -1, guessed.length};

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import math
+import struct
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Complex, Real
+from nldyn.engine.numbers import address_of
+
+Whole = NDArray[np.int64]
+RECORD_COLUMNS = ("phase", "duration", "kind", "event", "start", "force", "depth")
+FIRST_STATE = 4  # column of a record
+_RECORD = struct.Struct("3q")
 
 (
     OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL, ROUNDED,
@@ -76,45 +85,109 @@ class SystemData(NamedTuple):
     node_angle: float  # phase of the fastest mode from node to node, in rad
 
 
-class Record(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Record:
     """Pieces of a trajectory, enough to evaluate the state at any instant.
 
     Parameters
     ----------
-    phase, duration : (n_pieces,)
-        Forcing phase at the start, duration in s.
-    kind : (n_pieces,)
-        -1 for a flight, else the kind of the panel's ends.
-    event : (n_pieces,)
-        Stop that opens or closes at the end, or -1.
-    start : (n_pieces, 2n)
-        State z at the start.
-    force, depth : (n_pieces, n_stops, m)
-        Forces and penetrations at the nodes of a panel (zero where a stop is open).
-    used : (3,)
-        Number of pieces in use; the first of those of a motion before that are still ahead. They
-        stand at the end of the record and serve as guesses. Whether these are of another orbit.
+    block : (1 + capacity, width)
+        A row for each piece, below one that begins with how many are in use: phase, duration, kind,
+        event, state, forces, penetrations.
+    size, n_stops : int
+        Of the state, and of the stops and bonds.
+
+    Examples
+    --------
+    >>> empty_record(3, 2, 1, 14)
+    <Record of 0 pieces>
     """
 
-    phase: NDArray[np.float64]
-    duration: NDArray[np.float64]
-    kind: NDArray[np.int64]
-    event: NDArray[np.int64]
-    start: NDArray[np.float64]
-    force: NDArray[np.float64]
-    depth: NDArray[np.float64]
-    used: NDArray[np.int64]
+    block: Real
+    size: int
+    n_stops: int
+
+    def __repr__(self) -> str:
+        """One line: how many pieces."""
+        return f"<Record of {self.used} pieces>"
+
+    @classmethod
+    def of(
+        cls, phase: Real, duration: Real, kind: Whole, event: Whole, start: Real, force: Real,
+        depth: Real,
+    ) -> Record:  # fmt: skip
+        """The record of known pieces."""
+        count, size = start.shape
+        columns = np.stack([phase, duration, kind, event], axis=1)
+        at_nodes = np.stack([force, depth], axis=1)
+        rows = [columns, start, at_nodes.reshape(count, math.prod(at_nodes.shape[1:]))]
+        block = np.vstack([np.zeros(sum(part.shape[1] for part in rows)), np.hstack(rows)])
+        block[0, 0] = count
+        return cls(block, size, force.shape[1])
+
+    def fits(self, other: Record) -> bool:
+        """Whether another record has as many numbers for a piece."""
+        return bool(self.block.shape[1] == other.block.shape[1])
+
+    def kept(self) -> Record:
+        """The pieces in use, without room for others."""
+        return Record(self.block[: 1 + self.used].copy(), self.size, self.n_stops)
+
+    @property
+    def packed(self) -> bytes:
+        """The structure as the engine reads it."""
+        rows, width = self.block.shape
+        return _RECORD.pack(rows - 1, width, address_of(self.block))
+
+    @property
+    def used(self) -> int:
+        """Number of pieces in use."""
+        return int(self.block[0, 0])
+
+    @property
+    def phase(self) -> Real:
+        """Forcing phases (n,) at which the pieces begin."""
+        return self.block[1:, 0]
+
+    @property
+    def duration(self) -> Real:
+        """Their durations (n,) in s."""
+        return self.block[1:, 1]
+
+    @property
+    def kind(self) -> Whole:
+        """-1 (n,) for a flight, else the kind of the panel's ends."""
+        return self.block[1:, 2].astype(np.int64)
+
+    @property
+    def event(self) -> Whole:
+        """Stop (n,) that opens or closes at the end, or -1."""
+        return self.block[1:, 3].astype(np.int64)
+
+    @property
+    def start(self) -> Real:
+        """States z (n, 2n) at the starts."""
+        return self.block[1:, FIRST_STATE : FIRST_STATE + self.size]
+
+    @property
+    def force(self) -> Real:
+        """Forces (n, n_stops, m) at the nodes of a panel, zero where a stop is open."""
+        return self._at_nodes[:, 0]
+
+    @property
+    def depth(self) -> Real:
+        """Penetrations (n, n_stops, m), likewise."""
+        return self._at_nodes[:, 1]
+
+    @property
+    def _at_nodes(self) -> Real:
+        rows = self.block[1:, FIRST_STATE + self.size :]
+        nodes = rows.shape[1] // (2 * self.n_stops) if self.n_stops else 0
+        return rows.reshape(len(rows), 2, self.n_stops, nodes)
 
 
 def empty_record(capacity: int, size: int, n_stops: int, nodes: int) -> Record:
     """A record with room for so many pieces."""
-    return Record(
-        np.empty(capacity),
-        np.empty(capacity),
-        np.empty(capacity, dtype=np.int64),
-        np.empty(capacity, dtype=np.int64),
-        np.empty((capacity, size)),
-        np.empty((capacity, n_stops, nodes)),
-        np.empty((capacity, n_stops, nodes)),
-        np.zeros(3, dtype=np.int64),
-    )
+    block = np.empty((1 + capacity, FIRST_STATE + size + 2 * n_stops * nodes))
+    block[0, 0] = 0.0
+    return Record(block, size, n_stops)

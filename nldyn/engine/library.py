@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from scipy.linalg import cython_blas
 
 from nldyn.engine.layout import FIRST_POWER, SLIDING_TURNS
+from nldyn.engine.numbers import address_of
 
 FOLDER = Path(os.environ.get("NLDYN_ENGINE", Path(__file__).parent)).resolve()  # of sanitizers
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-_first_byte: Any = ctypes.c_char.from_buffer
 REBUILT = "'pip install .' or '-e .' builds it"
 NOT_BUILT = f"the engine of nldyn is not built: {REBUILT}"
 LAYOUT = 100 * FIRST_POWER + SLIDING_TURNS  # as `nldyn_layout` of the engine
@@ -46,14 +46,6 @@ def _load() -> ctypes.PyDLL:
     if wider.exists() and library.nldyn_runs_v3() and not baseline:
         return ctypes.PyDLL(str(wider))
     return library
-
-
-def address_of(array: NDArray[Any]) -> int:
-    """Address of an array's first number."""
-    try:
-        return ctypes.addressof(_first_byte(array))  # three times as fast as numpy's own way
-    except (TypeError, ValueError):  # it is read-only, or empty
-        return array.ctypes.data
 
 
 class Packed:

@@ -31,7 +31,7 @@ EXPORT double nldyn_torus_test(int64_t n, const Complex *multipliers)
 }
 
 /* index of the first of the two whose product is nearest to 1; `off`: how far that is from 1 */
-EXPORT int64_t nldyn_nearest_pair(int64_t n, const Complex *multipliers, double *off)
+static int64_t nearest_pair(int64_t n, const Complex *multipliers, double *off)
 {
     int64_t index = 0;
     *off = INFINITY;
@@ -66,7 +66,7 @@ static int closest(int n, const Complex *multipliers, Complex mu)
 }
 
 /* longest way of a multiplier near the unit circle to the nearest one of the next orbit */
-EXPORT double nldyn_travel(int64_t n, const Complex *before, const Complex *after)
+static double travel(int64_t n, const Complex *before, const Complex *after)
 {
     double longest = 0.0;
     for (int i = 0; i < n; i++)
@@ -78,6 +78,12 @@ EXPORT double nldyn_travel(int64_t n, const Complex *before, const Complex *afte
     return longest;
 }
 
+/* the same either way */
+EXPORT double nldyn_farthest_travel(int64_t n, const Complex *before, const Complex *after)
+{
+    return larger(travel(n, before, after), travel(n, after, before));
+}
+
 /* fewest multipliers outside the unit circle if each modulus may be off so far; -tolerance: most */
 EXPORT int64_t nldyn_number_outside(int64_t n, const Complex *multipliers, double tolerance)
 {
@@ -86,8 +92,36 @@ EXPORT int64_t nldyn_number_outside(int64_t n, const Complex *multipliers, doubl
     return found;
 }
 
+/* fill all test functions of multipliers, (7,): those of a flip, of a branch point and of a torus;
+ * the index of `nearest_pair` and how far off it is; fewest and most outside the circle */
+static void test_functions(int64_t n, const Complex *multipliers, double tolerance, double *found)
+{
+    found[0] = nldyn_shifted_product(n, multipliers, 1.0);
+    found[1] = nldyn_shifted_product(n, multipliers, -1.0);
+    found[2] = nldyn_torus_test(n, multipliers);
+    found[3] = (double)nearest_pair(n, multipliers, found + 4);
+    found[5] = (double)nldyn_number_outside(n, multipliers, tolerance);
+    found[6] = (double)nldyn_number_outside(n, multipliers, -tolerance);
+}
+
+/* Multipliers (n,) of the Jacobians (k, n, n), balanced, and the logarithms of their moduli (n,), see
+ * `nldyn_product_eigenvalues`; told (8,): the squeeze and all test functions. Whether it converged,
+ * or -1 without memory. */
+EXPORT int64_t nldyn_spectrum(const Host *host, int64_t k, int64_t n, const double *jacobians,
+                              double tolerance, Complex *multipliers, double *logarithms,
+                              double *told)
+{
+    double *balanced = malloc(sizeof(double) * ((size_t)k * n * n + 1));
+    int64_t converged = -1;
+    if (balanced && nldyn_balanced(k, n, jacobians, balanced))
+        converged = nldyn_product_eigenvalues(host, k, n, balanced, multipliers, logarithms, told);
+    if (converged >= 0) test_functions(n, multipliers, tolerance, told + 1);
+    free(balanced);
+    return converged;
+}
+
 /* distance of the nearest multiplier from the unit circle */
-EXPORT double nldyn_off_circle(int64_t n, const Complex *multipliers)
+static double off_circle(int64_t n, const Complex *multipliers)
 {
     double least = INFINITY;
     for (int i = 0; i < n; i++) least = smaller(least, fabs(modulus(multipliers[i]) - 1.0));
@@ -246,20 +280,73 @@ EXPORT int64_t nldyn_return_of_outside(int64_t m, int64_t n, const double *sigma
     return found;
 }
 
-/* Fill Jacobians (m, count) at positions (m,) by the polynomials through those (p, count) from first
- * up to last. */
-EXPORT void nldyn_jacobians_between(int64_t count, const double *jacobians, const double *places,
-                                    int64_t first, int64_t last, int64_t m, const double *sigmas,
-                                    double *found)
+/* the Jacobians of p orbits (p, k, n, n) at their places (p,) along a branch */
+typedef struct {
+    int64_t k, n;
+    const double *jacobians, *places;
+} Along;
+
+/* fill the Jacobians (k, n, n) at a position by the polynomials through those from first up to last */
+static void jacobians_at(const Along *along, int64_t first, int64_t last, double sigma,
+                         double *here)
 {
-    for (int64_t at = 0; at < m; at++) {
-        double *here = found + at * count;
-        for (int64_t e = 0; e < count; e++) here[e] = 0.0;
-        for (int64_t i = first; i < last; i++) {
-            double weight = 1.0;
-            for (int64_t j = first; j < last; j++)
-                if (j != i) weight *= (sigmas[at] - places[j]) / (places[i] - places[j]);
-            for (int64_t e = 0; e < count; e++) here[e] += weight * jacobians[i * count + e];
-        }
+    size_t count = (size_t)along->k * along->n * along->n;
+    const double *places = along->places;
+    for (size_t e = 0; e < count; e++) here[e] = 0.0;
+    for (int64_t i = first; i < last; i++) {
+        double weight = 1.0;
+        for (int64_t j = first; j < last; j++)
+            if (j != i) weight *= (sigma - places[j]) / (places[i] - places[j]);
+        for (size_t e = 0; e < count; e++) here[e] += weight * along->jacobians[i * count + e];
     }
+}
+
+/* Fill the multipliers (m, n) of the Jacobians at positions (m,) by the polynomials through those
+ * (p, k, n, n) from first up to last: the multipliers are not smooth where they meet. Whether there
+ * was memory. */
+EXPORT int64_t nldyn_multipliers_between(const Host *host, const Along *along, int64_t first,
+                                         int64_t last, int64_t m, const double *sigmas,
+                                         Complex *found)
+{
+    size_t count = (size_t)along->k * along->n * along->n;
+    double *memory = malloc(sizeof(double) * (count + along->n + 1)), squeeze;
+    int64_t done = memory != NULL;
+    for (int64_t i = 0; i < m && done; i++) {
+        jacobians_at(along, first, last, sigmas[i], memory);
+        done = nldyn_product_eigenvalues(host, along->k, along->n, memory, found + i * along->n,
+                                         memory + count, &squeeze) >= 0;
+    }
+    free(memory);
+    return done;
+}
+
+/* Fill the multipliers (n,) half-way between two of p orbits, whose own are given, and how far one
+ * moves from one orbit to the other. Whether all are too far from the circle to come near it in half
+ * a step, or -1 without memory: those do that move by less than `calm` times their distance. */
+EXPORT int64_t nldyn_half_way(const Host *host, const Along *along, int64_t p,
+                              const Complex *before, const Complex *after, double calm,
+                              Complex *middle, double *way)
+{
+    int64_t n = along->n;
+    double half = 0.5;
+    if (!nldyn_multipliers_between(host, along, 0, p, 1, &half, middle)) return -1;
+    *way = 2.0 * larger(nldyn_farthest_travel(n, before, middle),
+                        nldyn_farthest_travel(n, middle, after));
+    double nearest = smaller(off_circle(n, before), off_circle(n, after));
+    return *way < calm * smaller(nearest, off_circle(n, middle));
+}
+
+/* How far the multipliers (n,) half-way between the places first and first + 1, of three or four,
+ * are from those without one of the other orbits; -1 without memory. found: (n,) scratch. */
+EXPORT double nldyn_error_half_way(const Host *host, const Along *along, int64_t p, int64_t first,
+                                   const Complex *middle, Complex *found)
+{
+    double half = 0.5, error = 0.0;
+    int64_t from[2] = {p == 3 ? first : 0, 1}, number = p == 3 ? 2 : 3;
+    for (int i = 0; i < (p == 3 ? 1 : 2); i++) {
+        if (!nldyn_multipliers_between(host, along, from[i], from[i] + number, 1, &half, found))
+            return -1.0;
+        error = larger(error, travel(along->n, middle, found));
+    }
+    return error;
 }

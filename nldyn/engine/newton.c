@@ -28,6 +28,7 @@ typedef struct {
     const int64_t *parameters;
     const Complex *drive_by; /* (n_parameters, h, 3, 2n) derivative of `drive` by each */
     const double *row, *aim; /* (n_unknowns,) */
+    const double *like; /* block of the record of a motion nearby, whose panels are guesses, or none */
     double *told; /* (3,) number of steps, lengths of the first and the last */
     double *along; /* (n_unknowns,) vector along the branch, of no particular length */
     double *ends; /* (k, 2n) */
@@ -46,6 +47,7 @@ typedef struct {
     Panel panel;
     Scratch scratch;
     Watch watch;
+    const double *like; /* block of the record of a motion nearby, until it has served */
     double fastest, preload, omega;
     double *matrix, *sides, *known; /* Newton's method */
     int *order;
@@ -92,7 +94,8 @@ static int shoot(Call *call)
     memset(task->d_omegas, 0, sizeof(double) * kept * size);
     if (count > 0) memset(task->d_parameters, 0, sizeof(double) * kept * size * count);
     for (int s = 0; s < call->fl.n_stops; s++) task->closings[s] = 0;
-    remember(M->rec, (size_t)call->fl.n_stops * M->panel->m);
+    remember(M, call->like);
+    call->like = NULL;
     for (size_t i = 0; i < k; i++) {
         const double *start = task->point + i * size;
         if (task->chained && i > 0) start = task->ends + (i - 1) * size;
@@ -236,7 +239,7 @@ static double closing_noise(const Call *call)
     double size = 0.0;
     for (size_t i = 0; i < count; i++) size = larger(size, fabs(task->jacobians[i]));
     /* roundings of many pieces add up */
-    double pressed = PRELOADED * call->preload * sqrt((double)call->motion.rec->used[0]);
+    double pressed = PRELOADED * call->preload * sqrt((double)n_recorded(call->motion.rec));
     return (NOISE + pressed) * size;
 }
 
@@ -265,9 +268,8 @@ static int correct(Call *call)
         if (status != OK) return status;
         if (arrived(call, opening, noise, last, before)) return OK;
         if (iteration == task->max_iterations) return NOT_CONVERGED;
-        call->motion.rec->used[2] = 0;
         if (last > 0.5 * before) /* panels that change with what is remembered may keep it going */
-            call->motion.rec->used[0] = 0;
+            call->motion.rec->block[0] = 0.0;
     }
 }
 
@@ -295,7 +297,7 @@ static void lay_out(Block *block, const Gauss *tab, Call *call)
 EXPORT int64_t nldyn_newton(const Host *host, const System *sys, const Gauss *tab, Record *rec,
                             const Task *task)
 {
-    Call call = {.sys = sys, .task = task, .omega = task->omega};
+    Call call = {.sys = sys, .task = task, .omega = task->omega, .like = task->like};
     Block block = {NULL, 0};
     lay_out(&block, tab, &call);
     char *memory = malloc(block.used);

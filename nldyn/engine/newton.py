@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Complex, Real
 from nldyn.engine.layout import OUT_OF_MEMORY, Record, SystemData
-from nldyn.engine.library import HOST, Packed, address_of, function
-from nldyn.engine.numbers import reals
+from nldyn.engine.library import HOST, Packed, function
+from nldyn.engine.numbers import address_of, reals
 
 WIDTH = 8  # numbers in the widest register
-_TASK = struct.Struct("8q6d13q")  # the structure Task of newton.c
+_TASK = struct.Struct("8q6d14q")  # the structure Task of newton.c
 _newton = function("nldyn_newton", *[ctypes.c_char_p] * 5)
 
 
@@ -96,15 +96,10 @@ def packed_system(system: SystemData) -> Packed:
     )  # fmt: skip
 
 
-def packed_record(record: Record) -> Packed:
-    """A record's arrays as the engine fills them."""
-    return Packed(record.phase.size, *record)
-
-
 def newton(
     system: Packed,
     tables: Packed,
-    record: Packed,
+    record: Record,
     recording: bool,
     omega: float,
     point: Real,
@@ -114,15 +109,17 @@ def newton(
     parameters: NDArray[np.int64],
     drive_by: Complex,
     corrector: Corrector,
-    size: int,
     n_stops: int,
+    like: Record | None = None,
 ) -> Found:
     """Newton's method for the shooting equations on a plane, in place, or the flow map alone.
 
     Parameters
     ----------
-    system, tables, record : Packed
-        What is propagated, the collocation tables, and where the pieces are recorded.
+    system, tables : Packed
+        What is propagated, and the collocation tables.
+    record : Record
+        Where the pieces are recorded.
     recording : bool
         Whether to record.
     omega : float
@@ -140,9 +137,12 @@ def newton(
         Column of `StopRow`, or -1, and stop of each parameter; derivatives of `SystemData.drive`.
     corrector : Corrector
         The plane and when to stop.
-    size, n_stops : int
-        Of the state, and of the stops and bonds.
+    n_stops : int
+        Number of stops and bonds.
+    like : Record, optional
+        Of a motion nearby over the same phases, whose contact panels are the first guesses.
     """
+    size = record.size
     row, level, state_weight, rtol, longest, max_iterations, aim, wanted, turn = corrector
     k, count = phases.size - 1, len(parameters)
     n, kept = point.size if max_iterations else 0, k if with_columns else 1
@@ -157,9 +157,10 @@ def newton(
         omega, level, state_weight, rtol, longest, turn, address_of(point), address_of(phases),
         address_of(parameters) if count else 0, address_of(drive_by) if count else 0,
         address_of(row) if n else 0, address_of(aim) if n else 0,
+        address_of(like.block) if like is not None else 0,
         *[first_place + start for start in starts],
     )  # fmt: skip
-    outcome = _newton(HOST, system.content, tables.content, record.content, task)
+    outcome = _newton(HOST, system.content, tables.content, record.packed, task)
     if outcome == OUT_OF_MEMORY:
         raise MemoryError("no memory for a motion with so many modes and stops")
     told, along, ends, jacobians, d_omegas, by, closings = [numbers[part] for part in parts]

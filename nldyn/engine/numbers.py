@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
+import ctypes
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nldyn.base.arrays import Complex, Real
+
+_first_byte: Any = ctypes.c_char.from_buffer
+
+
+def address_of(array: NDArray[Any]) -> int:
+    """Address of an array's first number; none of an empty array."""
+    if not array.size:
+        return 0
+    try:
+        return ctypes.addressof(_first_byte(array))  # three times as fast as numpy's own way
+    except TypeError:  # it is read-only
+        return array.ctypes.data
 
 
 def reals(values: ArrayLike) -> Real:

@@ -12,6 +12,7 @@
 
 #define SMALL_MATRIX 16 /* of so many rows: the eigenvalues of a product take no time */
 #define MOST_QR_STEPS 150 /* for one or two eigenvalues; three or four are usual, thirty at a triple */
+#define MOST_ROUNDS 100 /* of balancing: four are usual */
 #define PATIENCE 50 /* steps before entries at the rounding level of a factor count as zero */
 #define ANY_NUMBER 4000.0 /* powers of 2 that take any number, and one near 1, to 0 */
 #define HALF_RANGE 2000.0
@@ -339,6 +340,79 @@ static void sort_values(int n, const Complex *values, const double *exponents, d
         multipliers[place] = complex_of(ldexp(values[i].re, two), ldexp(values[i].im, two));
         logarithms[place] = size;
     }
+}
+
+/* Length of row (or column) i of a matrix (n, n), and its largest entry. */
+static double length_of_line(const double *matrix, int n, int i, bool row, double *largest_entry)
+{
+    double square = 0.0;
+    *largest_entry = 0.0;
+    for (int j = 0; j < n; j++) {
+        double here = row ? matrix[i * n + j] : matrix[j * n + i];
+        square += squared(here);
+        *largest_entry = larger(*largest_entry, fabs(here));
+    }
+    return sqrt(square);
+}
+
+/* Fill powers of two (n,) for the coordinates, with which the rows and columns of a matrix (n, n) of
+ * no negative entries are alike in length, as LAPACK's dgebal does [Osborne 1960; James, Langou and
+ * Lowery 2014]. The matrix is scaled, too. */
+static void balance(double *matrix, int n, double *scale)
+{
+    const double most = DBL_MIN / DBL_EPSILON, worth = 0.95; /* a change by less is not worth it */
+    bool again = true;
+    for (int i = 0; i < n; i++) scale[i] = 1.0;
+    for (int round = 0; again && round < MOST_ROUNDS; round++) {
+        again = false;
+        for (int i = 0; i < n; i++) {
+            double column_entry, row_entry, factor = 1.0;
+            double column = length_of_line(matrix, n, i, false, &column_entry);
+            double row = length_of_line(matrix, n, i, true, &row_entry), both = column + row;
+            if (!(column > 0.0 && row > 0.0 && isfinite(both))) continue;
+            for (; column < 0.5 * row && larger(factor, column_entry) < 0.5 / most &&
+                   smaller(row, row_entry) > 2.0 * most; column *= 2.0, row *= 0.5) {
+                factor *= 2.0;
+                column_entry *= 2.0;
+                row_entry *= 0.5;
+            }
+            for (; 0.5 * column >= row && larger(row, row_entry) < 0.5 / most &&
+                   smaller(factor, smaller(column, column_entry)) > 2.0 * most;
+                 column *= 0.5, row *= 2.0) {
+                factor *= 0.5;
+                column_entry *= 0.5;
+                row_entry *= 2.0;
+            }
+            if (!(column + row < worth * both)) continue;
+            if (factor < 1.0 && scale[i] < 1.0 && factor * scale[i] <= most) continue;
+            if (factor > 1.0 && scale[i] > 1.0 && scale[i] >= 1.0 / (most * factor)) continue;
+            scale[i] *= factor;
+            again = true;
+            for (int j = 0; j < n; j++) matrix[i * n + j] /= factor;
+            for (int j = 0; j < n; j++) matrix[j * n + i] *= factor;
+        }
+    }
+}
+
+/* Fill the same maps (k, n, n) in coordinates scaled by powers of two, so that entries are alike;
+ * whether there was memory. Those that are not finite stay as they are. */
+EXPORT int64_t nldyn_balanced(int64_t k, int64_t n, const double *factors, double *found)
+{
+    size_t count = (size_t)n * n;
+    double *total = malloc(sizeof(double) * (count + n + 1)), *scale = total + count, sum = 0.0;
+    if (!total) return false;
+    memcpy(found, factors, sizeof(double) * count * k);
+    for (size_t i = 0; i < count; i++) {
+        total[i] = 0.0;
+        for (int64_t j = 0; j < k; j++) total[i] += fabs(factors[j * count + i]);
+        sum += total[i];
+    }
+    if (isfinite(sum)) {
+        balance(total, (int)n, scale);
+        for (size_t i = 0; i < count * k; i++) found[i] = found[i] * scale[i % n] / scale[i / n % n];
+    }
+    free(total);
+    return true;
 }
 
 /* Eigenvalues of factors[k-1] ... factors[0], (k, n, n), the largest modulus first; whether it

@@ -84,8 +84,9 @@ static void fill_impulses(const Piece *piece, const double *forces)
     }
 }
 
-/* fill w (2n,) a time t after the start of a panel, with the weights of the nodes up to t */
-static void state_in_contact(const Piece *piece, const double *weights, double t, double *w)
+/* fill w (2n,) with a state in a panel carried back to its start, by the weights of the nodes up to
+ * there */
+static void carried_back(const Piece *piece, const double *weights, double *w)
 {
     int size = piece->fl->size;
     for (int k = 0; k < size; k++) w[k] = piece->start[k];
@@ -93,6 +94,12 @@ static void state_in_contact(const Piece *piece, const double *weights, double t
         const double *share = piece->shares + (size_t)j * size;
         for (int k = 0; k < size; k++) w[k] -= weights[j] * share[k];
     }
+}
+
+/* fill w (2n,) a time t after the start of a panel, with the weights of the nodes up to t */
+static void state_in_contact(const Piece *piece, const double *weights, double t, double *w)
+{
+    carried_back(piece, weights, w);
     fly_state(piece->fl->blocks, piece->fl->n, w, t);
 }
 
@@ -113,19 +120,18 @@ static void state_at(const Piece *piece, double t, double *w)
 static void begin_piece(Piece *piece, const Record *rec, int64_t n)
 {
     const Flow *fl = piece->fl;
-    piece->kind = (int)rec->kind[n];
-    piece->h = rec->duration[n];
-    piece->phase = rec->phase[n];
-    const double *state = rec->start + (size_t)n * fl->size;
-    for (int k = 0; k < fl->size; k++) piece->start[k] = state[k];
+    const Recorded *from = recorded(rec, n);
+    piece->kind = (int)from->kind;
+    piece->h = from->duration;
+    piece->phase = from->phase;
+    for (int k = 0; k < fl->size; k++) piece->start[k] = from->start[k];
     for (int p = 0; p <= fl->n_terms; p++) {
         if (p > 0 && fl->terms[p - 1].kind != STEADY) continue;
         Complex turn = turned(p == 0 ? piece->phase : fl->terms[p - 1].order * piece->phase);
         const Complex *share = response_of(fl, p, 0);
         for (int k = 0; k < fl->size; k++) piece->start[k] -= product(share[k], turn).re;
     }
-    if (piece->kind != FLIGHT)
-        fill_impulses(piece, rec->force + (size_t)n * fl->n_stops * piece->tab->m);
+    if (piece->kind != FLIGHT) fill_impulses(piece, forces_of(fl, from));
 }
 
 static void lay_out_piece(Block *block, const Flow *fl, const Gauss *tab, Piece *piece)
@@ -170,7 +176,7 @@ EXPORT int64_t nldyn_sample_states(const Host *host, const System *sys, const Ga
     at_frequency(sys, omega, NULL, &fl);
     int64_t n = 0, ready = -1;
     for (int64_t i = 0; i < n_phases && !(i % 64 == 63 && interrupted(&watch)); i++) {
-        while (n + 1 < rec->used[0] && rec->phase[n + 1] <= phases[i]) n++;
+        while (n + 1 < n_recorded(rec) && recorded(rec, n + 1)->phase <= phases[i]) n++;
         if (ready != n) begin_piece(&piece, rec, n);
         ready = n;
         double t = (phases[i] - piece.phase) / omega;

@@ -1,19 +1,20 @@
 /* The record of a motion. */
 #include "engine.h"
 
-/* append a piece; its index, or -1 when the record is full */
-static int64_t record_piece(Motion *M, double phase, double h, int kind, int event)
+/* append a piece; none when the record is full */
+static Recorded *record_piece(Motion *M, double phase, double h, int kind, int event)
 {
     Record *rec = M->rec;
     const Flow *fl = M->fl;
-    int64_t n = rec->used[0];
-    if (n >= rec->capacity) return -1;
-    rec->used[1] = larger_index(rec->used[1], n + 1); /* what is remembered there is overwritten */
-    rec->phase[n] = M->before + phase;
-    rec->duration[n] = h;
-    rec->kind[n] = kind;
-    rec->event[n] = event;
-    double *start = rec->start + (size_t)n * fl->size;
+    int64_t n = n_recorded(rec);
+    if (n >= rec->capacity) return NULL;
+    M->ahead = larger_index(M->ahead, n + 1); /* what is remembered there is overwritten */
+    Recorded *piece = recorded(rec, n);
+    piece->phase = M->before + phase;
+    piece->duration = h;
+    piece->kind = kind;
+    piece->event = event;
+    double *start = piece->start;
     Complex turn = turned(phase);
     const Complex *steady = response_of(fl, 0, 0);
     for (int i = 0; i < fl->size; i++) start[i] = M->w[i] + product(steady[i], turn).re;
@@ -22,43 +23,38 @@ static int64_t record_piece(Motion *M, double phase, double h, int kind, int eve
         const Complex *share = response_of(fl, 1 + k, 0);
         for (int i = 0; i < fl->size; i++) start[i] += product(share[i], e).re;
     }
-    size_t width = (size_t)fl->n_stops * M->panel->m;
-    for (size_t i = n * width; i < (n + 1) * width; i++) rec->force[i] = rec->depth[i] = 0.0;
-    rec->used[0] = n + 1;
-    return n;
+    memset(forces_of(fl, piece), 0, sizeof(double) * 2 * fl->n_stops * M->panel->m);
+    rec->block[0] = (double)(n + 1);
+    return piece;
 }
 
 /* record the panel that has been solved; whether there was room */
 static bool record_panel(Motion *M, double phase, double h, int kind, int event)
 {
     const Panel *panel = M->panel;
-    int64_t n = record_piece(M, phase, h, kind, event);
-    if (n < 0) return false;
+    int m = panel->m;
+    Recorded *piece = record_piece(M, phase, h, kind, event);
+    if (!piece) return false;
+    double *forces = forces_of(M->fl, piece), *depths = depths_of(M->fl, m, piece);
     for (int a = 0; a < panel->na; a++) {
-        size_t place = ((size_t)n * M->fl->n_stops + panel->active[a]) * panel->m;
-        for (int i = 0; i < panel->m; i++) {
-            M->rec->force[place + i] = panel->F[a * panel->m + i];
-            M->rec->depth[place + i] = panel->output[a * panel->m + i];
-        }
+        size_t place = (size_t)panel->active[a] * m;
+        memcpy(forces + place, panel->F + a * m, sizeof(double) * m);
+        memcpy(depths + place, panel->output + a * m, sizeof(double) * m);
     }
     return true;
 }
 
-/* keep what a motion before needs to serve as a guess at the end of its own record; `width` is the
- * number of depths of a piece */
-static void remember(Record *rec, size_t width)
+/* put the pieces of a motion before at the end of a record, where they serve as guesses: those of a
+ * block of another one, or what it has itself recorded */
+static void remember(Motion *M, const double *other)
 {
-    int64_t used = rec->used[0], size = rec->capacity;
-    rec->used[0] = 0;
-    rec->used[1] = size;
-    if (2 * used > size) return;
-    for (int64_t i = used - 1; i >= 0; i--) {
-        int64_t n = size - used + i;
-        rec->phase[n] = rec->phase[i];
-        rec->duration[n] = rec->duration[i];
-        rec->kind[n] = rec->kind[i];
-        rec->event[n] = rec->event[i];
-        memmove(rec->depth + n * width, rec->depth + i * width, sizeof(double) * width);
-    }
-    rec->used[1] = size - used;
+    const Record *rec = M->rec;
+    const double *from = other ? other : rec->block;
+    int64_t used = (int64_t)from[0];
+    rec->block[0] = 0.0;
+    M->ahead = rec->capacity;
+    M->other = other != NULL;
+    if (2 * used > rec->capacity) return;
+    M->ahead -= used;
+    memcpy(recorded(rec, M->ahead), from + rec->width, sizeof(double) * used * rec->width);
 }

@@ -3,32 +3,35 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 
 import numpy as np
 
 from nldyn.base.arrays import Complex, Real
-from nldyn.engine.layout import OUT_OF_MEMORY
-from nldyn.engine.library import HOST, Packed, address_of, function
-from nldyn.engine.numbers import complexes, reals
+from nldyn.engine.layout import OUT_OF_MEMORY, Record
+from nldyn.engine.library import HOST, Packed, function
+from nldyn.engine.numbers import address_of, complexes, reals
 
 _POINTER, _WHOLE, _NUMBER = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _MOTION = [ctypes.c_char_p] * 4
 _sample_states = function("nldyn_sample_states", *_MOTION, _NUMBER, _WHOLE, _POINTER, _POINTER)
 _local_extremes = function(
-    "nldyn_local_extremes", *_MOTION, _NUMBER, _WHOLE, _WHOLE, _POINTER, _POINTER, _WHOLE,
-    _POINTER, _POINTER,
-)  # fmt: skip
+    "nldyn_local_extremes", *_MOTION, _NUMBER, _WHOLE, _WHOLE, _POINTER, _POINTER, _WHOLE, _POINTER
+)
+_touches = function(
+    "nldyn_touches", *_MOTION, _NUMBER, _WHOLE, _POINTER, _NUMBER, _WHOLE, _POINTER, _POINTER
+)
 
 
 def sample_states(
-    system: Packed, tables: Packed, record: Packed, omega: float, phases: Real, size: int
+    system: Packed, tables: Packed, record: Record, omega: float, phases: Real
 ) -> Real:
-    """States (n_phases, size) of a motion at ascending forcing phases."""
+    """States (n_phases, 2n) of a motion at ascending forcing phases."""
     phases = reals(phases)
-    states = np.empty((phases.size, size))
+    states = np.empty((phases.size, record.size))
     _check(
         _sample_states(
-            HOST, system.content, tables.content, record.content, omega, phases.size,
+            HOST, system.content, tables.content, record.packed, omega, phases.size,
             address_of(phases), address_of(states),
         )
     )  # fmt: skip
@@ -38,20 +41,22 @@ def sample_states(
 def local_extremes(
     system: Packed,
     tables: Packed,
-    record: Packed,
+    record: Record,
     omega: float,
     orders: Real,
     amplitudes: Complex,
     output: int,
 ) -> Real:
-    """Phases, values and kinds (+1 maximum, -1 minimum) of all local extremes of an output, (k, 3).
+    """Phases, values, whether they are maxima (1 or 0), and values again of all extremes, (k, 4).
 
     The motion is taken as periodic: an extreme at its start counts once.
 
     Parameters
     ----------
-    system, tables, record : Packed
-        The pieces of a motion, and of what.
+    system, tables : Packed
+        What moves, and the collocation tables.
+    record : Record
+        The pieces of its motion.
     omega : float
         Excitation frequency.
     orders, amplitudes : (k,)
@@ -60,19 +65,47 @@ def local_extremes(
         The output.
     """
     orders, amplitudes = reals(orders), complexes(amplitudes)
-    count, capacity = np.zeros(1, dtype=np.int64), 64
+    base = orders.size, address_of(orders), address_of(amplitudes)
+    motion = HOST, system.content, tables.content, record.packed, omega
+    return _filled(lambda room, place: _local_extremes(*motion, output, *base, room, place))
+
+
+def touches(
+    system: Packed, tables: Packed, record: Record, omega: float, gaps: Real, share: float
+) -> tuple[Real, list[int]]:
+    """Extremes (k, 4) of the stops' penetrations, and how many of each stop's are shallow.
+
+    A row has the phase, the penetration, a key (twice the number of the stop, for a maximum one
+    more), and the penetration with the gap. Shallow are those within a share of the largest.
+
+    Parameters
+    ----------
+    system, tables, record, omega
+        As of `local_extremes`.
+    gaps : (n_stops,)
+        What is taken off.
+    share : float
+        That of the largest.
+    """
+    shallow = np.zeros(gaps.size, dtype=np.int64)
+    motion = HOST, system.content, tables.content, record.packed, omega
+    given = gaps.size, address_of(gaps), share
+    counts = address_of(shallow)
+    found = _filled(lambda room, place: _touches(*motion, *given, room, place, counts))
+    return found, shallow.tolist()
+
+
+def _filled(fill: Callable[[int, int], int]) -> Real:
+    """Extremes that a function fills: it is told the room and the address, and tells how many."""
+    room = 64
     while True:
-        found = np.empty((capacity, 3))
-        _check(
-            _local_extremes(
-                HOST, system.content, tables.content, record.content, omega, output, orders.size,
-                address_of(orders), address_of(amplitudes), capacity, address_of(found),
-                address_of(count),
-            )
-        )  # fmt: skip
-        if count[0] <= capacity:
-            return found[: count[0]].copy()
-        capacity = int(count[0])
+        found = np.empty((room, 4))
+        count = fill(room, address_of(found))
+        if count < 0:
+            _check(OUT_OF_MEMORY)
+        if count <= room:
+            return found[:count].copy()
+        room = count
 
 
 def _check(outcome: int) -> None:

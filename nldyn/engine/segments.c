@@ -127,7 +127,7 @@ static int fly(Motion *M, double here)
             stop = s;
         }
     }
-    if (M->recording && record_piece(M, here, first, FLIGHT, stop) < 0) return RECORD_FULL;
+    if (M->recording && !record_piece(M, here, first, FLIGHT, stop)) return RECORD_FULL;
     fly_state(fl->blocks, fl->n, M->w, first);
     if (M->with_columns) fly_columns(fl->blocks, fl->n, M->columns, M->n_columns, first);
     M->t = stop < 0 ? M->duration : M->t + first;

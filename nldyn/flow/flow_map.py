@@ -13,7 +13,7 @@ import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +46,8 @@ from nldyn.engine.layout import (
     empty_record,
 )
 from nldyn.engine.library import Packed
-from nldyn.engine.newton import Corrector, Found, newton, packed_record, packed_system
-from nldyn.engine.sample import local_extremes, sample_states
+from nldyn.engine.newton import Corrector, Found, newton, packed_system
+from nldyn.engine.sample import local_extremes, sample_states, touches
 from nldyn.flow.gauss import GaussTables, gauss_tables
 from nldyn.flow.options import FlowOptions, PanelBounds, _floats, _nodes_for_switch
 from nldyn.flow.packing import (
@@ -67,6 +67,7 @@ from nldyn.system.system import Clock, System, same_system
 __all__ = ["FlowMap", "FlowOptions", "Segments", "Trajectory"]
 
 _NONE = Corrector(np.empty(0), 0.0, 0.0, 0.0, 0.0, 0, np.empty(0), -1, 0.0)
+SHALLOW = 1e-3  # of the deepest extreme: depths up to it are told exactly where stops are touched
 BUNCH = 20  # excitation periods in one compiled call, where many follow each other
 _REASONS = {
     TOO_MANY_PIECES: "more than 20000 flights and contact panels in one segment: too many contacts "
@@ -139,8 +140,7 @@ class FlowError:
     d_parameters: float = 0.0
 
 
-@dataclass(frozen=True)
-class Solution:
+class Solution(NamedTuple):
     """Outcome of Newton's method for the shooting equations.
 
     Parameters
@@ -345,6 +345,10 @@ class FlowMap:
         return self.rows[[*stops, *seconds]]
 
     @cached_property
+    def _gaps(self) -> Real:
+        return np.array([stop.gap for stop in self.system.stops])
+
+    @cached_property
     def rate_rows(self) -> Real:
         """Rows of the outputs' velocities in flight."""
         return self.system.linear.times_block(self.rows)
@@ -455,7 +459,7 @@ class FlowMap:
             numbers that make no sense.
         """
         found = self._fly(
-            self._no_room, False, nodes, phases, omega, chained, sensitivities, parameters
+            self.no_record, False, nodes, phases, omega, chained, sensitivities, parameters
         )
         return Segments(*found[5:], self._reason(found.outcome))
 
@@ -561,8 +565,7 @@ class FlowMap:
         capacity = (16 if chained else 64) * np.size(phases)
         while True:
             record = self._record(capacity)
-            room = packed_record(record)
-            found = self._fly(room, True, nodes, phases, omega, chained, False)
+            found = self._fly(record, True, nodes, phases, omega, chained, False)
             if found.outcome != RECORD_FULL:
                 return self._motion(omega, record, found)
             capacity *= 4
@@ -603,11 +606,10 @@ class FlowMap:
         capacity = 64 * phases.size
         while True:
             point, record = guess.copy(), self._record(capacity)
-            if like is not None:
-                _remember(like.record, record)
             found = self._call(
-                packed_record(record), True, 0.0, point, phases, False, True, (), corrector
-            )
+                record, True, 0.0, point, phases, False, True, (), corrector,
+                like.record if like is not None and like.record.fits(record) else None,
+            )  # fmt: skip
             if found.outcome != RECORD_FULL:
                 motion = self._motion(math.exp(point[-1]), record, found)
                 return Solution(
@@ -618,7 +620,7 @@ class FlowMap:
 
     def _fly(
         self,
-        record: Packed,
+        record: Record,
         recording: bool,
         nodes: Real,
         phases: Real,
@@ -637,7 +639,7 @@ class FlowMap:
 
     def _call(
         self,
-        record: Packed,
+        record: Record,
         recording: bool,
         omega: float,
         point: Real,
@@ -646,6 +648,7 @@ class FlowMap:
         sensitivities: bool,
         parameters: Sequence[Parameter],
         corrector: Corrector | None = None,
+        like: Record | None = None,
     ) -> Found:
         """The engine, which corrects the point (N + 1,) or, without corrector, only flies."""
         table, drive_by = (
@@ -653,8 +656,7 @@ class FlowMap:
         )
         found = newton(
             self._packed, self._packed_tables, record, recording, omega, point, phases, chained,
-            sensitivities, table, drive_by, corrector or _NONE, self.system.state_size,
-            len(self._pushed),
+            sensitivities, table, drive_by, corrector or _NONE, len(self._pushed), like,
         )  # fmt: skip
         if len(self._pushed) > len(self.system.stops):  # what comes after the stops never closes
             return found._replace(closings=found.closings[: len(self.system.stops)])
@@ -675,20 +677,13 @@ class FlowMap:
         return self._record(0)
 
     @cached_property
-    def _no_room(self) -> Packed:
-        """The same as the engine reads it."""
-        return packed_record(self.no_record)
-
-    @cached_property
     def _no_parameters(self) -> tuple[NDArray[np.int64], Complex]:
         drive = self._unforced.drive
         return np.zeros((0, 2), dtype=np.int64), np.zeros((0, *drive.shape), dtype=complex)
 
     def _motion(self, omega: float, rec: Record, found: Found) -> Trajectory:
         """The motion in a record, of which only the used part is kept."""
-        n = int(rec.used[0])
-        pieces = Record._make([*(array[:n].copy() for array in rec[:-1]), rec.used])
-        return Trajectory(self, omega, pieces, found.closings, self._reason(found.outcome))
+        return Trajectory(self, omega, rec.kept(), found.closings, self._reason(found.outcome))
 
     @cached_property
     def finer(self) -> FlowMap:
@@ -749,15 +744,6 @@ def _columns(name: str, values: Real, count: int) -> Real:
     if values.ndim == 0 or values.shape[-1] != count:
         raise SystemModelError(f"{name} must have {count} columns, got an array {values.shape}")
     return values
-
-
-def _remember(pieces: Record, record: Record) -> None:
-    """Put the pieces of a motion, as far as they serve as guesses, into an empty record."""
-    n = pieces.phase.size
-    if n <= record.phase.size:
-        for name in ("phase", "duration", "kind", "event", "depth"):
-            getattr(record, name)[:n] = getattr(pieces, name)
-        record.used[0], record.used[2] = n, 1
 
 
 def relative_error(value: Real, reference: Real) -> float:
@@ -839,10 +825,7 @@ class Trajectory:
                 f"{phases[0]:g} to {phases[-1]:g}"
             )
         flow = self.flow
-        return sample_states(
-            flow._packed, flow._packed_tables, self._packed, self.omega, phases,
-            flow.system.state_size,
-        )  # fmt: skip
+        return sample_states(flow._packed, flow._packed_tables, self.record, self.omega, phases)
 
     def _solved_in_contact(self, phases: Real) -> tuple[NDArray[np.intp], Real]:
         """Which of some ascending phases lie in contact panels, and the flow map's states (k, 2n).
@@ -864,7 +847,7 @@ class Trajectory:
         start = np.maximum.accumulate(np.where(begins, 0, np.arange(begins.size)))[piece[inside]]
         legs = np.stack([rec.phase[start], phases[inside]], axis=1).ravel()
         nodes = np.repeat(rec.start[start], 2, axis=0)[:-1]
-        found = flow._call(flow._no_room, False, self.omega, nodes, legs, False, False, ())
+        found = flow._call(flow.no_record, False, self.omega, nodes, legs, False, False, ())
         return (inside, found.ends[::2]) if found.outcome == OK else none
 
     @cached_property
@@ -895,12 +878,26 @@ class Trajectory:
         check_whole("output", output, 0, len(flow.rows) - 1)
         first = flow.first_alike[output]
         if first not in self._extremes:
-            ride = flow.ride(first, self.omega)
-            self._extremes[first] = local_extremes(
-                flow._packed, flow._packed_tables, self._packed, self.omega, ride.orders,
-                ride.amplitudes, first,
-            )  # fmt: skip
+            if first < len(flow.system.stops):
+                found = self.recorded_touches[0]
+                found = found[found[:, 2] // 2.0 == first]
+            else:
+                ride = flow.ride(first, self.omega)
+                found = local_extremes(
+                    flow._packed, flow._packed_tables, self.record, self.omega, ride.orders,
+                    ride.amplitudes, first,
+                )  # fmt: skip
+            kinds = 2.0 * (found[:, 2] % 2.0) - 1.0
+            self._extremes[first] = np.stack([found[:, 0], found[:, 3], kinds], axis=1)
         return self._extremes[first]
+
+    @cached_property
+    def recorded_touches(self) -> tuple[Real, list[int]]:
+        """Extremes of the penetrations, and how many are shallow, see `engine.sample.touches`."""
+        flow = self.flow
+        return touches(
+            flow._packed, flow._packed_tables, self.record, self.omega, flow._gaps, SHALLOW
+        )
 
     @cached_property
     def _extremes(self) -> dict[int, Real]:
@@ -908,15 +905,22 @@ class Trajectory:
 
     def with_exact_values(self, found: Real, output: int, wanted: NDArray[np.bool_]) -> Real:
         """Extremes (k, 3) of an output, those wanted (k,) with the values of the flow map."""
+        places, values = self.exact_values(found, output, wanted)
+        exact = found.copy()
+        exact[places, 1] = values
+        return exact
+
+    def exact_values(
+        self, found: Real, output: int, wanted: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.intp], Real]:
+        """Which of the extremes (k, 3) wanted (k,) lie in contacts, and the flow map's values."""
         order = np.argsort(found[:, 0], kind="stable")
         order = order[wanted[order]]
         inside, solved = self._solved_in_contact(found[order, 0])
-        exact = found.copy()
-        phases = found[order[inside], 0]
-        carried = self.flow.ride(output, self.omega).at(phases)
+        places = order[inside]
+        carried = self.flow.ride(output, self.omega).at(found[places, 0])
         # BLAS would sum in an order that depends on how many are wanted
-        exact[order[inside], 1] = self.flow.outputs_at(output, solved) + carried
-        return exact
+        return places, self.flow.outputs_at(output, solved) + carried
 
     @cached_property
     def contacts_at_nodes(self) -> tuple[Real, Real]:
@@ -946,8 +950,3 @@ class Trajectory:
         kind, duration = rec.kind[contact], rec.duration[contact, None]
         phases = rec.phase[contact, None] + self.omega * duration * tables.chi[kind]
         return phases.ravel(), (duration * tables.weights[kind]).ravel()
-
-    @cached_property
-    def _packed(self) -> Packed:
-        """The recorded pieces as the engine reads them."""
-        return packed_record(self.record)

@@ -29,7 +29,7 @@ from nldyn.branches.continuation import alike
 from nldyn.branches.endings import StopReason
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.branches.tables import UNITS, orbit_columns
-from nldyn.engine.layout import Record
+from nldyn.engine.layout import RECORD_COLUMNS, Record
 from nldyn.flow.flow_map import FlowMap, Trajectory, same_flow
 from nldyn.io.flow import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
 from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute
@@ -281,7 +281,7 @@ def _write_motions(group: Any, motions: Sequence[Trajectory | None], flow: FlowM
 def _record_columns(flow: FlowMap) -> list[tuple[str, NDArray[Any]]]:
     """Names of the columns of a record, and empty ones."""
     empty = flow._record(0)
-    return [(name, getattr(empty, name)) for name in Record._fields if name != "used"]
+    return [(name, getattr(empty, name)) for name in RECORD_COLUMNS]
 
 
 def write_course(group: Any, course: Course) -> None:
@@ -426,9 +426,8 @@ def _read_motions(group: Group, count: int, flow: FlowMap) -> list[Trajectory | 
     end = 0
     for i, number in enumerate(pieces.tolist()):
         start, end = end, end + number
-        used = np.array([number, number], dtype=np.int64)
         part = {name: column[start:end] for name, column in columns.items()}
-        record = Record(**part, used=used)
+        record = Record.of(**part)
         motion = Trajectory(flow, float(omega[i]), record, closings[i], "")
         motions.append(motion if number else None)
     return motions

@@ -236,7 +236,7 @@ class OrbitFamily:
     def scale(self, point: Real) -> float:
         """Root mean square of the states: the unit of relative lengths."""
         states = point[: self.n_states] if self.origin is None else self.from_origin(point)
-        return math.sqrt(float(states @ states) / self.segments) or 1.0
+        return math.sqrt(float(states @ states) / self.problem.segments) or 1.0
 
     def from_origin(self, point: Real) -> Real:
         """States (N,) counted from the origin."""
@@ -244,8 +244,9 @@ class OrbitFamily:
 
     def metric(self, point: Real) -> Real:
         """Weights g of the arclength ds² = Σ g Δ², relative in the states."""
-        weights = np.ones(point.size)
-        weights[: self.n_states] = 1.0 / (self.segments * self.scale(point) ** 2)
+        n, weights = self.n_states, np.empty(point.size)
+        weights[:n] = 1.0 / (self.problem.segments * self.scale(point) ** 2)
+        weights[n:] = 1.0
         return weights
 
 
@@ -567,9 +568,14 @@ class Corrected:
     def tangent(self, towards: Real) -> Real:
         """Unit tangent of the curve, on the side of the vector `towards`."""
         along = self.along
-        weighted = self.family.metric(self.point) * along
+        weighted = self.weights * along
         length = math.sqrt(float(along @ weighted))
         return along / (length if float(towards @ weighted) >= 0.0 else -length)
+
+    @cached_property
+    def weights(self) -> Real:
+        """Metric (N + m,) at the point."""
+        return self.family.metric(self.point)
 
     @property
     def converged(self) -> bool:

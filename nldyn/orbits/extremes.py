@@ -1,77 +1,84 @@
-"""Which extremes of two orbits belong together and pass zero between them (engine/matching.c)."""
+"""Which extremes of two orbits belong together and pass zero between them (engine/matching.c).
+
+Extremes are rows as of `nldyn.engine.sample.touches`.
+"""
 
 from __future__ import annotations
 
 import ctypes
+import struct
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
-from nldyn.engine.library import Packed, address_of, function
-from nldyn.engine.numbers import flags, reals
+from nldyn.engine.library import function
+from nldyn.engine.numbers import address_of
 
-Kinds = NDArray[np.bool_]
-Extremes = tuple[Real, Real, Kinds]
-_WHOLE, _NUMBER, _POINTER, _EXTREMES = (
-    ctypes.c_int64, ctypes.c_double, ctypes.c_void_p, ctypes.c_char_p
+_WHOLE, _NUMBER, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+_nearest = function("nldyn_nearest", _WHOLE, _POINTER, *[_NUMBER] * 3)
+_sign_changes = function("nldyn_sign_changes", *(_WHOLE, _POINTER) * 2, _WHOLE, _NUMBER, _POINTER)
+_alone = function("nldyn_alone", *(_WHOLE, _POINTER) * 2, _NUMBER, _POINTER, result=None)
+_dips = function(
+    "nldyn_dips", _NUMBER, _NUMBER, _WHOLE, ctypes.c_char_p, _WHOLE, ctypes.c_char_p,
+    *[_POINTER] * 3, _NUMBER, _POINTER, result=None,
 )  # fmt: skip
-_nearest = function("nldyn_nearest", _EXTREMES, _WHOLE, _NUMBER, _NUMBER)
-_sign_changes = function("nldyn_sign_changes", _EXTREMES, _EXTREMES, _NUMBER, _POINTER, _POINTER)
-_alone = function("nldyn_alone", _EXTREMES, _EXTREMES, _NUMBER, _POINTER, result=None)
-_dip = function("nldyn_dip", *[_NUMBER] * 5, result=_NUMBER)
-_extreme_dip = function(
-    "nldyn_extreme_dip", _NUMBER, _NUMBER, *[_EXTREMES] * 3, _NUMBER, result=_NUMBER
-)
+_COUNTS = struct.Struct("3q")
 
 
-def _packed(phases: Real, values: Real, kinds: Kinds) -> Packed:
-    phases = reals(phases)
-    return Packed(phases.size, phases, reals(values), flags(kinds))
+def nearest(extremes: Real, key: int, phase: float, full: float) -> int:
+    """Index of the extreme (k, 4) of a key nearest in phase on a circle of length `full`, or -1."""
+    return int(_nearest(len(extremes), address_of(extremes), key, phase, full))
 
 
-def nearest(phases: Real, kinds: Kinds, kind: bool, phase: float, full: float) -> int:
-    """Index of the extreme of a kind nearest in phase on a circle of length `full`, or -1."""
-    extremes = _packed(phases, phases, kinds)
-    return int(_nearest(extremes.content, int(kind), phase, full))
-
-
-def sign_changes(
-    phases_a: Real, values_a: Real, kinds_a: Kinds, phases_b: Real, values_b: Real,
-    kinds_b: Kinds, full: float,
-) -> tuple[Kinds, Real]:  # fmt: skip
-    """Kinds and phases of the extremes of a and b, nearest to each other, of opposite signs.
+def sign_changes(before: Real, after: Real, stops: int, full: float) -> list[list[float]]:
+    """Keys and phases of the extremes, nearest to each other, of opposite signs.
 
     The phase is that of the extreme nearer to zero.
     """
-    a, b = _packed(phases_a, values_a, kinds_a), _packed(phases_b, values_b, kinds_b)
-    kinds, phases = np.empty(phases_b.size, dtype=np.bool_), np.empty(phases_b.size)
-    n = _sign_changes(a.content, b.content, full, address_of(kinds), address_of(phases))
-    return kinds[:n], phases[:n]
+    found = np.empty((len(after), 2))
+    count = _sign_changes(
+        len(before), address_of(before), len(after), address_of(after), stops, full,
+        address_of(found),
+    )  # fmt: skip
+    pairs: list[list[float]] = found[:count].tolist()
+    return pairs
 
 
-def alone(phases_a: Real, kinds_a: Kinds, phases_b: Real, kinds_b: Kinds, full: float) -> Kinds:
-    """Which extremes of b none of a belongs to: those born or lost between them."""
-    a, b = _packed(phases_a, phases_a, kinds_a), _packed(phases_b, phases_b, kinds_b)
-    found = np.empty(phases_b.size, dtype=np.bool_)
-    _alone(a.content, b.content, full, address_of(found))
+def alone(before: Real, after: Real, full: float) -> NDArray[np.bool_]:
+    """Which extremes after none before belongs to: those born or lost between them."""
+    found = np.empty(len(after), dtype=np.bool_)
+    _alone(len(before), address_of(before), len(after), address_of(after), full, address_of(found))
     return found
 
 
-def dip(left: float, right: float, before: float, here: float, after: float) -> float:
-    """Where a function may touch zero unseen between `left` and `right` of here, or nan.
+def dips(
+    left: float, right: float, tests: list[float], stops: int, beside: list[Real], full: float
+) -> list[float]:
+    """Where functions and extremes may touch zero unseen between `left` and `right`, or nan.
 
-    Its three values have one sign, but the parabola through them comes within a quarter of zero.
+    The three values of such a function have one sign, but the parabola through them comes within a
+    quarter of zero. Of each stop it is the first of the extremes that does so, each with the
+    nearest ones beside it.
+
+    Parameters
+    ----------
+    left, right : float
+        Where the points beside this one are.
+    tests : list of float
+        Of all functions the values before, then those here, then those after.
+    stops : int
+        Number of stops.
+    beside : list of (k, 4) arrays
+        Extremes before, here and after.
+    full : float
+        Phase of a period.
     """
-    return float(_dip(left, right, before, here, after))
-
-
-def extreme_dip(
-    left: float, right: float, before: Extremes, here: Extremes, after: Extremes, full: float
-) -> float:
-    """The same for the first of the extremes that does so, each with the nearest ones beside it.
-
-    Extremes are their phases, values, and whether they are maxima.
-    """
-    z, a, b = (_packed(*each) for each in (before, here, after))
-    return float(_extreme_dip(left, right, z.content, a.content, b.content, full))
+    count = len(tests) // 3
+    found = np.empty(count + stops)
+    _dips(
+        left, right, count, struct.pack(f"{len(tests)}d", *tests), stops,
+        _COUNTS.pack(*map(len, beside)), *map(address_of, beside), full, address_of(found),
+    )  # fmt: skip
+    where: list[float] = found.tolist()
+    return where

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 from dataclasses import dataclass
 from functools import lru_cache
@@ -9,17 +10,25 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgebal
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ComputationError
-from nldyn.orbits.periodic_schur import product_eigenvalues
+from nldyn.engine.library import HOST, function
+from nldyn.engine.numbers import address_of, reals
+from nldyn.orbits.critical_functions import ROUNDED_MODULUS, Critical
+from nldyn.orbits.periodic_schur import NO_MEMORY, product_eigenvalues
 
 EPS = float(np.finfo(float).eps)
 SAMPLES = 4  # perturbations: the uncertainty is off by a factor above 10 once in 6000 times
 COARSE = 1e-8  # a segment that squeezes a direction more than so, beside its norm, is cut
 FINE = 1e-4  # and the pieces should squeeze no more than so
 MOST_PARTS = 64
+FAILED = "the multipliers of an orbit could not be computed"
+_spectrum = function(
+    "nldyn_spectrum", ctypes.c_char_p, *[ctypes.c_int64] * 2, ctypes.c_void_p, ctypes.c_double,
+    *[ctypes.c_void_p] * 3,
+)  # fmt: skip
+_balanced = function("nldyn_balanced", *[ctypes.c_int64] * 2, *[ctypes.c_void_p] * 2)
 
 
 class MultiplierError(ComputationError):
@@ -41,11 +50,14 @@ class FloquetSpectrum:
         The smallest factor by which a segment multiplies one of the directions of the periodic
         Schur form, relative to the segment's largest entry: multipliers are rounded relative to
         the largest entry, so that directions squeezed by less than 1e-16 are lost.
+    critical : Critical
+        Test functions of the multipliers.
     """
 
     multipliers: NDArray[np.complex128]
     log_moduli: Real
     squeeze: float
+    critical: Critical
 
 
 @dataclass(frozen=True)
@@ -108,15 +120,20 @@ def floquet_spectrum(jacobians: Real) -> FloquetSpectrum:
     >>> [float(f"{x:.6g}") for x in floquet_spectrum(np.array(quarters)).multipliers.real]
     [1000000000000.0, 1e-12]
     """
-    return _spectrum_of_balanced(balanced(jacobians))
-
-
-def _spectrum_of_balanced(jacobians: Real) -> FloquetSpectrum:
-    jacobians = np.ascontiguousarray(jacobians, dtype=float)
-    values, logarithms, squeeze, converged = product_eigenvalues(jacobians)
+    jacobians = reals(jacobians)
+    k, n, _ = jacobians.shape
+    numbers = np.empty(3 * n + 8)
+    place = address_of(numbers)
+    converged = _spectrum(
+        HOST, k, n, address_of(jacobians), ROUNDED_MODULUS, place, place + 16 * n, place + 24 * n
+    )
+    if converged < 0:
+        raise MemoryError(NO_MEMORY)
     if not converged:
-        raise MultiplierError("the multipliers of an orbit could not be computed")
-    return FloquetSpectrum(values, logarithms, squeeze)
+        raise MultiplierError(FAILED)
+    squeeze, *tests = numbers[3 * n :].tolist()
+    multipliers = numbers[: 2 * n].view(np.complex128)
+    return FloquetSpectrum(multipliers, numbers[2 * n : 3 * n], squeeze, Critical.told(tests))
 
 
 def balanced(jacobians: Real) -> Real:
@@ -130,11 +147,11 @@ def balanced(jacobians: Real) -> Real:
     >>> balanced(np.array([[[1.0, 1024.0], [1.0 / 1024.0, 1.0]]])).tolist()
     [[[1.0, 2.0], [0.5, 1.0]]]
     """
-    total = np.abs(jacobians).sum(axis=0)
-    if not np.all(np.isfinite(total)):
-        return jacobians
-    *_, scale, _ = dgebal(total, scale=1, permute=0)  # matrix_balance takes ten times as long
-    return np.asarray(jacobians * scale / scale[:, None])
+    jacobians = reals(jacobians)
+    found = np.empty_like(jacobians)
+    if not _balanced(*jacobians.shape[:2], address_of(jacobians), address_of(found)):
+        raise MemoryError(NO_MEMORY)
+    return found
 
 
 def uncertainties(jacobians: Real, found: FloquetSpectrum, error: float) -> Real:
@@ -171,9 +188,8 @@ def uncertainties(jacobians: Real, found: FloquetSpectrum, error: float) -> Real
     sizes = np.linalg.norm(jacobians, axis=(1, 2))[:, None, None]
     total = np.zeros(n)
     for direction in _directions(k, n):
-        try:
-            moved = _spectrum_of_balanced(jacobians + error * sizes * direction).log_moduli
-        except MultiplierError:
+        _, moved, _, converged = product_eigenvalues(jacobians + error * sizes * direction)
+        if not converged:
             return np.full(n, math.inf)
         with np.errstate(invalid="ignore"):
             total += (moved - found.log_moduli) ** 2

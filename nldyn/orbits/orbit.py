@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from nldyn.base.arrays import SLACK, Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, check_whole, numbers
-from nldyn.flow.flow_map import FlowError, FlowMap, Solution, Trajectory, chain
+from nldyn.flow.flow_map import SHALLOW, FlowError, FlowMap, Solution, Trajectory, chain
 from nldyn.flow.rigid import (
     impacts_in_order,
     rest_forces,
@@ -23,6 +23,7 @@ from nldyn.flow.rigid import (
 )
 from nldyn.flow.sliding import SliderMeasures, slider_measures
 from nldyn.orbits.areas import AreaMeasures, area_measures
+from nldyn.orbits.critical_functions import Critical
 from nldyn.orbits.history import History
 from nldyn.orbits.multipliers import (
     COARSE,
@@ -44,7 +45,6 @@ SAME_PHASE = 1e-9  # in rad: an extreme and an impact
 LIFTS_OFF = 1e-5  # rad behind rest, where a flight that grows with their cube is rounding
 SAME = 1e-5  # distance of orbits that are one, relative to their size
 REPEATS = 1e-6  # the same of an orbit from itself some periods later
-SHALLOW = 1e-3  # of the deepest extreme: depths up to it are told exactly where stops are touched
 LARGEST_EXPONENT = 700.0  # of a finite exponential
 LOST = 1e-6  # rounding of a determinant's logarithm, above which it tells nothing
 
@@ -179,7 +179,7 @@ class Orbit:
         """The system."""
         return self.problem.flow.system
 
-    @property
+    @cached_property
     def omega(self) -> float:
         """Excitation frequency in rad/s."""
         return float(np.exp(self.point[-1]))
@@ -220,6 +220,11 @@ class Orbit:
         damps it to less than rounding.
         """
         return self._spectrum[0].log_moduli
+
+    @property
+    def critical(self) -> Critical:
+        """Test functions of the multipliers."""
+        return self._spectrum[0].critical
 
     @cached_property
     def _spectrum(self) -> tuple[FloquetSpectrum, Real]:
@@ -348,13 +353,32 @@ class Orbit:
         The others have an error of 1e-6 of the deepest, and need no further flow.
         """
         if stop not in self._touches:
-            found = self.trajectory.recorded_extremes(stop)
-            depth = np.abs(found[:, 1] - self.system.stops[stop].gap)
-            shallow = depth <= SHALLOW * depth.max(initial=0.0)
-            if shallow.any():
-                found = self.trajectory.with_exact_values(found, stop, shallow)
-            self._touches[stop] = self._as_extremes(found, stop)
+            phases, values, keys, _ = self.touched[self.touched[:, 2] // 2.0 == stop].T
+            self._touches[stop] = Extremes(phases, values, keys % 2.0 > 0.0)
         return self._touches[stop]
+
+    @cached_property
+    def touched(self) -> Real:
+        """The same of all stops, as `nldyn.orbits.extremes` compares them, (k, 4)."""
+        found, shallow = self.trajectory.recorded_touches
+        if not (self.system.rigid_stops or any(shallow)):
+            return found
+        parts = [np.empty((0, 4))]
+        for number, stop in enumerate(self.system.stops):
+            of_stop = found[found[:, 2] // 2.0 == number]
+            if shallow[number]:
+                depths = np.abs(of_stop[:, 1])
+                near = depths <= SHALLOW * depths.max()
+                places, values = self.trajectory.exact_values(of_stop, number, near)
+                of_stop[places, 1] = values - stop.gap
+            parts.append(self._off_rigid_stop(of_stop, number) if stop.impulsive else of_stop)
+        return np.concatenate(parts)
+
+    @cached_property
+    def touch_counts(self) -> tuple[int, ...]:
+        """How many extremes each stop's penetration has."""
+        of_stop = (self.touched[:, 2] // 2.0).tolist()
+        return tuple(of_stop.count(stop) for stop in range(len(self.system.stops)))
 
     @cached_property
     def _extremes(self) -> dict[int, Extremes]:
@@ -367,12 +391,20 @@ class Orbit:
     def _as_extremes(self, found: Real, output: int) -> Extremes:
         stops = self.system.stops
         offset = stops[output].gap if output < len(stops) else 0.0
-        phases, values, kinds = found[:, 0], found[:, 1] - offset, found[:, 2] > 0.0
+        found = found - np.array([0.0, offset, 0.0])
         if output in self.system.rigid_stops:
-            values, hit = self._beyond_rigid_stop(output, phases, values)
-            free = np.where(hit, ~self._settles(output, phases), ~self._rests(output, phases))
-            phases, values, kinds = phases[free], values[free], kinds[free]
-        return Extremes(phases, values, kinds)
+            found = self._off_rigid_stop(found, output)
+        phases, values, kinds = found.T
+        return Extremes(phases, values, kinds > 0.0)
+
+    def _off_rigid_stop(self, found: Real, stop: int) -> Real:
+        """Extremes (k, ...) of a rigid stop's penetration without those where a body rests."""
+        phases = found[:, 0]
+        depths, hit = self._beyond_rigid_stop(stop, phases, found[:, 1])
+        free = np.where(hit, ~self._settles(stop, phases), ~self._rests(stop, phases))
+        found = found.copy()
+        found[:, 1] = depths
+        return found[free]
 
     def _settles(self, stop: int, phases: Real) -> NDArray[np.bool_]:
         """Whether impacts at phases belong to a series that ends in rest."""
@@ -470,7 +502,7 @@ class Orbit:
         Impacts with a rigid stop that end in rest count as one.
         """
         if not self.rests:
-            return int(self.trajectory.closings.sum())
+            return sum(self.trajectory.closings.tolist())
         count = 0
         for index, stop in enumerate(self.system.stops):
             if stop.impulsive:

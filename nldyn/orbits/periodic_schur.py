@@ -7,9 +7,10 @@ import ctypes
 import numpy as np
 
 from nldyn.base.arrays import Complex, Real
-from nldyn.engine.library import HOST, address_of, function
-from nldyn.engine.numbers import reals
+from nldyn.engine.library import HOST, function
+from nldyn.engine.numbers import address_of, reals
 
+NO_MEMORY = "no memory for the multipliers"
 _eigenvalues = function(
     "nldyn_product_eigenvalues", ctypes.c_char_p, *[ctypes.c_int64] * 2, *[ctypes.c_void_p] * 4
 )
@@ -38,5 +39,5 @@ def product_eigenvalues(factors: Real) -> tuple[Complex, Real, float, bool]:
         ctypes.addressof(squeeze),
     )  # fmt: skip
     if converged < 0:
-        raise MemoryError("no memory for the multipliers")
+        raise MemoryError(NO_MEMORY)
     return multipliers, logarithms, squeeze.value, converged == 1

@@ -7,7 +7,7 @@ the equations say that each segment ends where the next one starts.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -74,7 +74,7 @@ class ShootingProblem:
     def metric(self, point: Real) -> Real:
         """Weights g of the arclength: ds² = Σ g Δ², relative in states and frequency."""
         weights = np.empty(point.size)
-        weights[:-1], weights[-1] = self._weight(point), 1.0
+        weights[:-1], weights[-1] = 1.0 / (self.segments * self.scale(point) ** 2), 1.0
         return weights
 
     def jacobians(self, point: Real, parts: int) -> Real | None:
@@ -116,30 +116,30 @@ class ShootingProblem:
         level = float(row @ guess) if offset is None else offset
         row = np.ascontiguousarray(row, dtype=float)
 
-        def solved(start: Real, near: Trajectory | None, expected: Real) -> Solution:
+        def solved(
+            start: Real, size: float, near: Trajectory | None, expected: Real
+        ) -> tuple[Solution, float]:
             corrector = Corrector(
-                row, level, self._weight(start), TOLERANCE, longest, max_iterations, expected,
-                closings, turn,
+                row, level, 1.0 / (self.segments * size**2), TOLERANCE, longest, max_iterations,
+                expected, closings, turn,
             )  # fmt: skip
-            return self.flow.newton(start, corrector, self.phases, near)
+            found = self.flow.newton(start, corrector, self.phases, near)
+            return found, self.scale(found.point)
 
         guess = np.ascontiguousarray(guess, dtype=float)
-        found = solved(guess, like, guess if aim is None else aim)
+        before = self.scale(guess)
+        found, size = solved(guess, before, like, guess if aim is None else aim)
         # steps count relative to the start, and may still be large beside a much smaller orbit;
         # motions at rest are not found any better
-        while found.converged and self.scale(found.point) < MUCH_SMALLER * self.scale(guess):
-            finer = solved(found.point, None, found.point)
-            if not finer.converged and self.scale(found.point) < AT_REST * self.scale(guess):
+        while found.converged and size < MUCH_SMALLER * before:
+            finer, finer_size = solved(found.point, size, None, found.point)
+            if not finer.converged and size < AT_REST * before:
                 break
-            guess, found = found.point, finer
+            before, found, size = size, finer, finer_size
         if found.converged and found.last_step > LOOSE:
             largest = float(np.abs(found.jacobians).max())
-            return replace(found, failure=f"Jacobians of {largest:.1e} make too much of rounding")
+            return found._replace(failure=f"Jacobians of {largest:.1e} make too much of rounding")
         return found
-
-    def _weight(self, point: Real) -> float:
-        """Weight of the square of a state's change."""
-        return 1.0 / (self.segments * self.scale(point) ** 2)
 
     def tangent(self, found: Solution, towards: Real) -> Real:
         """Unit tangent of the branch at a solution, on the side of the vector `towards`."""

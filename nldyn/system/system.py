@@ -518,7 +518,7 @@ class System:
         rubs = any(stop.friction for stop in self.round_stops.values())
         return not (damped or rubs or self.loses_by_speed)
 
-    @property
+    @cached_property
     def jumps(self) -> bool:
         """Whether a force or a velocity jumps where a stop is hit, or a slider turns."""
         return bool(self.sliders) or any(stop.jumps for stop in self.stops)

@@ -101,7 +101,7 @@ def energy_change(name: str) -> Measured:
     start[: system.size] = -1e-3 * np.sign(system.participation["middle"])
     flow = FlowMap(system, FlowOptions(rtol=1e-13, nodes=24))
     motion = simulate(flow, 20.0, COUNTED, start=start, transient=PERIODS - COUNTED)
-    pieces = sum(int(stretch.record.used[0]) for stretch in motion.stretches) / COUNTED
+    pieces = sum(stretch.record.used for stretch in motion.stretches) / COUNTED
     change = energy(system, motion.end) / energy(system, start) - 1.0
     note = f"relative change {change:.1e}, {pieces:.1f} flights and panels in a period"
     return Measured(abs(change) / (PERIODS * pieces * 2.0**-52), note)

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from independent import exact_flight, state_map
 
 from nldyn import Damper, FlowMap, HarmonicForce, System, Unbalance
-from nldyn.engine.library import address_of, function
+from nldyn.engine.library import function
+from nldyn.engine.numbers import address_of
 from nldyn.system.linear import _growth
 
 RNG = np.random.default_rng(1)

@@ -265,7 +265,6 @@ def test_what_is_done_counts_a_search_for_contact_until_contact_is_found():
         assert done == sorted(done) and done[0] < 0.75 and max(done) <= 1.0
 
 
-
 def test_a_diagram_as_one_table(harmonic_branch):
     """Rows of all branches below each other, in pandas and xarray."""
     pytest.importorskip("pandas")
