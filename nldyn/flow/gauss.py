@@ -175,7 +175,8 @@ def peaks(values: Real) -> Real:
     lean = 0.5 * (after - before)
     inside = (bend < 0.0) & (np.abs(lean) <= -bend)
     top = here - 0.5 * lean**2 / np.where(inside, bend, -1.0)
-    return np.where(inside, top, values.max(axis=1))
+    largest = values.max(axis=1)  # at an end the parabola's vertex may lie below it
+    return np.where(inside, np.maximum(top, largest), largest)
 
 
 @lru_cache(maxsize=8)

@@ -112,7 +112,9 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
     ways = np.diff(place)[panels] - slider.friction.base_speed * duration
     size = np.abs(place).max() + np.abs(slider.friction.base_speed * duration).max(initial=0.0)
     held = held_in_pieces(motion, number)[panels]
-    slides = np.abs(ways) > np.where(held, UNMOVED, ROUNDING) * size
+    mobility = float(flow.rate_rows[output] @ flow.force_columns[:, output])
+    pulled = np.where(held, mobility * np.abs(force).max(axis=1, initial=0.0) * duration**2, 0.0)
+    slides = np.abs(ways) > np.where(held, UNMOVED, ROUNDING) * (size + pulled)
     along = np.column_stack([place[panels], inner, place[panels + 1]])[slides]
     lengths = tables.weights[rec.kind[panels[slides]]] * duration[slides, None]
     moved = tables.weights[SMOOTH] * (along @ tables.derivative.T)
