@@ -23,12 +23,13 @@ def turned(unit: str) -> str:
 
     Examples
     --------
-    >>> turned("m/s"), turned("N s/m"), turned("N/m^exponent"), turned("W")
-    ('rad/s', 'N m s/rad', 'N m/rad^exponent', 'W')
+    >>> turned("m/s"), turned("N s/m"), turned("N/m^exponent"), turned("N/m per m²")
+    ('rad/s', 'N m s/rad', 'N m/rad^exponent', 'N m/rad per m²')
     """
     if unit == "kg m":  # of an unbalance, which times a squared speed is a force
         return "kg m²"
-    return re.sub(r"\bN\b", "N m", re.sub(r"\bm\b", "rad", unit))
+    unit, per, area = unit.partition(" per ")  # what an area is measured in does not turn
+    return re.sub(r"\bN\b", "N m", re.sub(r"\bm\b", "rad", unit)) + per + area
 
 
 def moment_unit(unit: str) -> str:

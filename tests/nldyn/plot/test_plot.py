@@ -29,6 +29,7 @@ from nldyn.plot.words import unit_in
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene
 from nldyn.system.chart import NAMES, UNITS
+from nldyn.system.contact_area import contact_area
 from nldyn.system.loads import HarmonicForce, Unbalance
 from nldyn.system.parameters import OF_SPRINGS, Parameter
 from nldyn.system.springs_dampers import Damper, PolynomialSpring, Spring
@@ -42,6 +43,7 @@ OF_ROTATIONS = {
     "N s/m": "N m s/rad",
     "s/m": "s/rad",
     "N/m$^p$": "N m/rad$^p$",
+    "N/m$^p$ per m² or m": "N m/rad$^p$ per m² or m",
     "kg m": "kg m²",
 } | {f"N/m^{power}": f"N m/rad^{power}" for power in range(1, 10)}
 
@@ -165,9 +167,10 @@ def test_unit(size, unit):
 @pytest.mark.parametrize("name", NAMES)
 def test_axes_of_curves_name_every_parameter_and_its_unit(name):
     spring = PolynomialSpring("tip", [1.0] * 9) if name in OF_SPRINGS else Spring("tip", 1.0)
+    area = contact_area("edge", ["tip"], 1e6)
     system = System.from_modal(
         [10.0], {"tip": [1.0], "slide": [0.5]}, springs=[spring], dampers=[Damper("tip", 1.0)],
-        stops=[Stop("tip", 1e6, tangent="slide", friction=0.1)],
+        stops=[Stop("tip", 1e6, tangent="slide", friction=0.1), *area],
         excitation=[HarmonicForce("tip", 1.0)],
     )  # fmt: skip
     _, label = _scale_and_label(Parameter(name), 1.0, system)
