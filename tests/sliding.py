@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from nldyn.system import Friction
 
 Vector = NDArray[np.float64]
-FIRST_STEP = 1e-9  # behind an event, which another one may follow at once
+FIRST_STEP = 1e-9  # beside springs: behind an event, which another one may follow at once
 ROUNDED = 1.0 + 1e-12  # times its friction: what slips no more than a rounding before
 
 
@@ -271,9 +271,10 @@ class Body:
         self.begin(t, y)
         while t < end:
             events = self.events()
+            sprung = any(contact.spring is not None for contact in self.contacts)
             run = solve_ivp(
                 self.rate, (t, end), y, method="DOP853", rtol=1e-12, atol=1e-15,
-                max_step=longest, first_step=min(FIRST_STEP, end - t),
+                max_step=longest, first_step=min(FIRST_STEP, end - t) if sprung else None,
                 events=[event for _, _, event in events],
             )  # fmt: skip
             self.add_up(float(run.t[-1]) - t, run.y[:, -1] - y)
