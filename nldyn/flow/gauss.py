@@ -176,7 +176,8 @@ def peaks(values: Real) -> Real:
     inside = (bend < 0.0) & (np.abs(lean) <= -bend)
     top = here - 0.5 * lean**2 / np.where(inside, bend, -1.0)
     largest = values.max(axis=1)  # at an end the parabola's vertex may lie below it
-    return np.where(inside, np.maximum(top, largest), largest)
+    found: Real = np.where(inside, np.maximum(top, largest), largest)
+    return found
 
 
 @lru_cache(maxsize=8)
