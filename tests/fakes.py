@@ -1,6 +1,6 @@
 """Orbits, branches and diagrams that look computed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -21,6 +21,7 @@ SURE = Stability(0.5 + 0.2j, -0.62, 1e-7)
 class FakeSystem:
     interfaces: tuple[str, ...] = ("middle",)
     stops: tuple[object, ...] = ()
+    areas: dict[str, tuple[int, ...]] = field(default_factory=dict)
     sliders: tuple[object, ...] = ()
     frequencies_hz: tuple[float, ...] = ()
 

@@ -37,7 +37,7 @@ from nldyn.orbits.shooting import shifts
 from nldyn.runtime.prefetch import Ahead
 from nldyn.runtime.progress import of_value, shows_progress
 from nldyn.runtime.threads import one_thread
-from nldyn.system.chart import Chart, checked_parameter, told_value, value_of
+from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, told_value, value_of
 from nldyn.system.parameters import Parameter
 
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
@@ -172,7 +172,8 @@ def family_over(
     SystemModelError
         If the range is empty or does not hold the orbit, or there is no such parameter.
     """
-    chart = Chart.of(checked_parameter(orbit.system, parameter), limits)
+    chosen = checked_parameter(orbit.system, FREQUENCY if parameter is None else parameter)
+    chart = Chart.of(chosen, limits)
     value = value_of(orbit.system, orbit.frequency_hz, chart.parameter)
     slack = SLACK * max(abs(chart.low), abs(chart.high))
     if not chart.low - slack <= value <= chart.high + slack:

@@ -64,7 +64,7 @@ class Axis:
             If there is no such parameter, it cannot have these values, or the frequency is given
             where it changes or missing where it does not.
         """
-        chosen = checked_parameter(system, parameter)
+        chosen = checked_parameter(system, FREQUENCY if parameter is None else parameter)
         name = parameter_name(chosen)
         if moves_frequency(chosen):
             if frequency_hz is not None:

@@ -160,14 +160,14 @@ def has_exact_derivatives(parameter: Parameter) -> bool:
     return parameter.name in (*_OF_STOPS, *OF_AREAS, *SOURCES, *OF_SLIDERS, *OF_SPRINGS)
 
 
-def checked_parameter(system: System, parameter: str | Parameter | None) -> Parameter:
-    """A parameter, of which a name alone means index 0; the frequency for None.
+def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
+    """A parameter, of which a name alone means index 0.
 
     Parameters
     ----------
     system : System
         The system that must have it.
-    parameter : str or Parameter, optional
+    parameter : str or Parameter
         An `OwnParameter`, or frequency_hz; gap, stiffness, exponent, dissipation, dashpot or
         restitution of a stop; amplitude, mass_times_radius or force of an excitation; friction or
         normal_force of a slider; area_gap, area_stiffness or area_friction of an area of contact;
@@ -182,8 +182,6 @@ def checked_parameter(system: System, parameter: str | Parameter | None) -> Para
     SystemModelError
         If there is no such number.
     """
-    if parameter is None:
-        return THE_FREQUENCY
     if isinstance(parameter, OwnParameter):
         _own_value(system, parameter)
         return parameter
