@@ -73,24 +73,41 @@ def describe_system(system: System, residual: int = 0) -> str:
 
 def describe_rest(system: System) -> list[str]:
     """Say where the structure rests, and what holds it, if that is not at zero."""
-    from nldyn.system.equilibrium import closed_at_rest, rest_positions
-    from nldyn.system.naming import moment_unit
+    from nldyn.system.equilibrium import rest_positions
 
     found = rest_positions(system)
     q, others = found[0], found[1:]
     if not q.any() and not others:
         return []
-    places = _places(system, q)
     return [
-        f"at rest: {places}",
+        f"at rest: {_places(system, q)}",
         *(f"or at rest: {_places(system, other)}" for other in others),
-        *(
-            f"at rest the {_short(system.stops[i])} is closed by {depth:.6g} {unit}: "
-            f"{force:.6g} {moment_unit(unit)}"
-            for i, depth, force in closed_at_rest(system, q)
-            for unit in [system.unit(system.stops[i].at)]
-        ),
+        *_closed(system, q),
     ]
+
+
+def _closed(system: System, q: Real) -> list[str]:
+    """A line for each stop that is closed at rest, and one for each area of contact."""
+    from nldyn.system.equilibrium import closed_at_rest
+    from nldyn.system.naming import moment_unit
+
+    closed, of_areas = closed_at_rest(system, q), _places_of_areas(system)
+    lines = [
+        f"at rest the {_short(system.stops[i])} is closed by {depth:.6g} {unit}: "
+        f"{force:.6g} {moment_unit(unit)}"
+        for i, depth, force in closed
+        if i not in of_areas
+        for unit in [system.unit(system.stops[i].at)]
+    ]
+    for name, places in system.areas.items():
+        forces = [force for i, _, force in closed if i in places]
+        if forces:
+            unit = moment_unit(system.unit(system.stops[places[0]].at))
+            lines.append(
+                f"at rest {len(forces)} of {len(places)} points of the contact area '{name}' are "
+                f"closed: {sum(forces):.6g} {unit} in all"
+            )
+    return lines
 
 
 def _short(stop: AnyStop) -> str:
@@ -111,24 +128,30 @@ def _places(system: System, q: Real) -> str:
 
 
 def told_interfaces(system: System) -> list[str]:
-    """The interfaces, without the points of areas of contact."""
+    """The interfaces, without the points of areas of contact unless there are no others."""
     points = {
         end
         for name in system.areas
         for stop in system.area_stops(name)
         for end in (stop.at, stop.against, stop.tangent, stop.tangent_against)
     }
-    return [name for name in system.interfaces if name not in points]
+    return [name for name in system.interfaces if name not in points] or list(system.interfaces)
 
 
 def describe_stops(system: System) -> list[str]:
     """A line for each stop, and one for each area of contact."""
+    of_areas = _places_of_areas(system)
     single = [
         describe_stop(stop, system.unit(stop.at))
-        for stop in system.stops
-        if getattr(stop, "area", None) is None
+        for place, stop in enumerate(system.stops)
+        if place not in of_areas
     ]
     return single + [describe_area(system, name) for name in system.areas]
+
+
+def _places_of_areas(system: System) -> set[int]:
+    """Which of the stops are points of areas of contact."""
+    return {place for places in system.areas.values() for place in places}
 
 
 def describe_area(system: System, name: str) -> str:
@@ -197,7 +220,7 @@ def describe_spring(spring: AnySpring, length: str = "m") -> str:
 
 def describe_sliders(system: System) -> list[str]:
     """A line for each slider, but those of areas of contact."""
-    of_areas = {place for places in system.areas.values() for place in places}
+    of_areas = _places_of_areas(system)
     return [
         describe_slider(slider, system.unit(slider.at))
         for slider in system.sliders

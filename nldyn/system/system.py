@@ -573,14 +573,14 @@ class System:
         """
         stops = list(self.stops)
         points = self.area_stops(number)
-        moved = value - min(stop.gap for stop in points)
+        smallest = min(stop.gap for stop in points)
         for place, stop in zip(list(self.areas.values())[number], points, strict=True):
-            values: dict[str, Any] = {
-                "gap": stop.gap + moved,
-                "stiffness": value * stop.share,
-                "friction": stop.law_of_friction.with_coefficient(value),
-            }
-            stops[place] = replace(stop, **{name: values[name]})
+            change: dict[str, Any] = {"gap": value + (stop.gap - smallest)}
+            if name == "stiffness":
+                change = {"stiffness": value * stop.share}
+            elif name == "friction":
+                change = {"friction": stop.law_of_friction.with_coefficient(value)}
+            stops[place] = replace(stop, **change)
         return self.with_elements(stops=stops)
 
     @cached_property

@@ -16,6 +16,7 @@ from nldyn import (
     contact_area,
     solve_orbit,
 )
+from nldyn.app.describe import describe_rest, describe_system
 from nldyn.system import rest
 from nldyn.system.chart import value_of, with_value
 from tests.independent import Motion
@@ -164,6 +165,22 @@ def test_derivatives_by_the_numbers_of_an_area_of_many_points_are_those_of_diffe
         ]
         differences = (ends[0] - ends[1])[0] / (2.0 * step)
         assert np.abs(exact[0, :, 0] - differences).max() < 1e-4 * np.abs(differences).max()
+
+
+def test_an_area_may_be_closed_at_rest_and_is_told_in_a_line():
+    """Its smallest gap is -1 mm: both springs of 100 N/m lift what hangs on one of 200 N/m."""
+    edge = contact_area("edge", ["left", "right"], 100.0, gap=[1e-3, 1e-3])
+    system = System.from_matrices(
+        [[1.0]], [[200.0]], {"left": [1.0], "right": [1.0]}, modal_damping=0.1, stops=edge
+    )
+    pressed = with_value(system, Parameter("area_gap"), -1e-3)
+    assert value_of(pressed, 1.0, Parameter("area_gap")) == -1e-3
+    assert [stop.friction for stop in pressed.stops] == [None, None]
+    assert describe_rest(pressed) == [
+        "at rest: -0.0005 m at 'left', -0.0005 m at 'right'",
+        "at rest 2 of 2 points of the contact area 'edge' are closed: 0.1 N in all",
+    ]
+    assert "contact area 'edge': 2 points, 200 N/m in all" in describe_system(pressed)
 
 
 @pytest.mark.slow
