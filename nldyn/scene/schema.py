@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
@@ -41,6 +42,12 @@ def _plausible(value: float) -> float:
     return value
 
 
+def _no_truth_value(value: object) -> object:
+    if isinstance(value, bool):
+        raise ValueError("must be 1 or -1")
+    return value
+
+
 Number = Annotated[float, AfterValidator(_plausible)]
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
@@ -49,6 +56,7 @@ ModeFrequency = Annotated[NotNegative, Field(le=1e12)]
 Period = Annotated[int, Field(ge=1, le=100)]
 Matrix = list[list[Number]]
 Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Sign = Annotated[Literal[1, -1], BeforeValidator(_no_truth_value)]
 Axis = Literal["x", "y", "z", "-x", "-y", "-z"]
 Direction = Literal["x", "y", "rotation", "z", "rotation_x", "rotation_y", "rotation_z"]
 
@@ -679,7 +687,7 @@ class ContactAreaTable(Table):
     direction: Axis | Triple | None = None
     """Axis or vector of the normal, along which the structure moves to close the gap: `"y"`,
     `"-y"`, ... A mesh needs it."""
-    closes: Literal[1, -1] = 1
+    closes: Sign = 1
     """Of a list of interfaces: `1` if positive displacements close the gap, `-1` if negative ones
     do."""
     points: Annotated[int, Field(ge=1, le=12)] | Literal["nodes"] = 1
@@ -736,14 +744,17 @@ class ContactAreaTable(Table):
             raise ValueError("has 'axis', which needs the 'radius' of a cylinder")
         if self.radius == 0.0:
             raise ValueError("needs a 'radius' other than 0")
-        of_mesh = ("direction", "slope", "radius", "axis", "centre", "attachment_modes")
+        of_mesh = (
+            *("direction", "points", "slope", "radius", "axis", "centre"),
+            *("surface", "surface_against", "attachment_modes", "static_error"),
+        )
         listed = isinstance(self.at, list)
         if listed:
             _refuse(self, of_mesh, "a list of interfaces")
             if len(set(self.at)) < len(self.at):
                 raise ValueError("must name each interface once in 'at'")
         else:
-            _refuse(self, ("weights", "along_against"), "an area of a mesh")
+            _refuse(self, ("closes", "weights", "along_against"), "an area of a mesh")
             if self.direction is None:
                 raise ValueError("needs 'direction', the normal along which the gap closes")
         for key in ("against", "along"):
@@ -771,18 +782,11 @@ class StopTable(Table):
     gap: Number = 0.0
     """[m] Clearance at rest. A negative gap is a preload: the stop presses on the structure at
     rest; a rigid one has none."""
-    direction: Literal[1, -1] = 1
+    direction: Sign = 1
     """`1` if positive displacements close the gap, `-1` if negative ones do."""
     against: str | None = None
     """Another interface that carries the stop, so that the relative displacement counts; the
     ground unless given."""
-
-    @field_validator("direction", mode="before")
-    @classmethod
-    def _no_truth_value(cls, value: object) -> object:
-        if isinstance(value, bool):
-            raise ValueError("must be 1 or -1")
-        return value
 
     @model_validator(mode="after")
     def _two_ends(self) -> StopTable:
@@ -1335,7 +1339,12 @@ def _refuse_own(table: StopTable | FrictionTable | SpringTable | DamperTable | J
         raise ValueError("needs another interface than its own in 'against'")
 
 
+def exponent_of(table: HertzStopTable | RoundClearanceTable | ContactAreaTable) -> float:
+    """Exponent of the law of a contact."""
+    return 1.0 if table.law == "linear" else table.exponent or 1.5
+
+
 def _refuse(table: BaseModel, names: tuple[str, ...], of: str) -> None:
     for name in names:
-        if getattr(table, name) is not None:
+        if name in table.model_fields_set and getattr(table, name) is not None:
             raise ValueError(f"has '{name}', which is not a key of {of}")

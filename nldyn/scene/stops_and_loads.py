@@ -23,6 +23,7 @@ from nldyn.scene.schema import (
     Scene,
     SpringTable,
     StopTable,
+    exponent_of,
 )
 from nldyn.system.friction import DryFriction, Friction
 from nldyn.system.loads import BaseMotion, ConstantForce, Excitation, HarmonicForce, Unbalance
@@ -126,9 +127,9 @@ def _stop(table: StopTable) -> AnyStop:
         assert table.radius is not None and table.youngs_modulus is not None
         ratio = 0.3 if table.poissons_ratio is None else table.poissons_ratio
         stiffness = hertz_stiffness(table.radius, table.youngs_modulus, ratio)
-    exponent, loss = table.exponent or 1.5, _dissipation(table)
     place = table.gap, table.direction, table.against
-    return Stop(table.at, stiffness, exponent, *place, loss, dashpot=table.dashpot)
+    loss = _dissipation(table)
+    return Stop(table.at, stiffness, exponent_of(table), *place, loss, dashpot=table.dashpot)
 
 
 def _round_stop(table: RoundClearanceTable) -> RoundStop:
@@ -140,7 +141,7 @@ def _round_stop(table: RoundClearanceTable) -> RoundStop:
         (first, second),
         table.stiffness,
         table.clearance,
-        1.0 if table.law == "linear" else table.exponent or 1.5,
+        exponent_of(table),
         (x, y),
         table.inside,
         against,

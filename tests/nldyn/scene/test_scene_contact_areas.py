@@ -109,6 +109,9 @@ def test_a_list_of_interfaces_shares_a_law(tmp_path):
         ('at = ["left", "right"]', 'at = "left"', "is not a key of an area of a mesh"),
         ("weights = [0.5, 0.25]", "friction = 0.2", "needs both 'friction' and 'along'"),
         ("weights = [0.5, 0.25]", "radius = 2.0", "is not a key of a list of interfaces"),
+        ("weights = [0.5, 0.25]", "points = 3", "'points', which is not a key of a list"),
+        ("weights = [0.5, 0.25]", "surface = 0.1", "'surface', which is not a key of a list"),
+        ("weights = [0.5, 0.25]", "closes = true", "must be 1 or -1"),
     ],
 )
 def test_what_makes_no_area_of_interfaces_is_refused(tmp_path, old, new, said):
@@ -125,6 +128,7 @@ def test_what_makes_no_area_of_interfaces_is_refused(tmp_path, old, new, said):
         ('at = "strip"', 'at = "tip"', "no outer face, edge or beam whose nodes are all in it"),
         ("gap = 1e-4", "gap = [1e-4, 2e-4]", "gap has 2 values, but the area has 40 points"),
         ("radius = 20.0", "radius = 0.1", "beyond the radius"),
+        ("points = 2", "points = 2\ncloses = -1", "is not a key of an area of a mesh"),
         ("modes = 4", "tolerance = 0.01", "does not go with reduction.tolerance"),
         ("points = 2", 'points = 2\nagainst = "root"', "nothing of that lies opposite"),
     ],
