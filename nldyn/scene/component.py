@@ -9,7 +9,7 @@ import fem
 from nldyn.base.errors import SceneError
 from nldyn.base.resources import data_directory
 from nldyn.scene.checks import check_mesh_names
-from nldyn.scene.contact import with_areas
+from nldyn.scene.contact import check_one_mesh, with_areas
 from nldyn.scene.described_parts import told_otherwise, with_described_parts
 from nldyn.scene.faults import check_regular, told_as, unreadable
 from nldyn.scene.messages import KeyPath, scene_error
@@ -55,22 +55,16 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component:
         if scene.mesh.merge:
             mesh = fem.joined([mesh], None if scene.mesh.merge is True else scene.mesh.merge)
     mesh = _noted(scene, _with_places(scene, mesh))
-    scene = with_described_parts(scene, mesh)
+    described = with_described_parts(scene, mesh)
     with told_as(scene, ("mesh", "file"), fem.ModelError):
-        check_mesh_names(scene, mesh, scene.file)
+        check_mesh_names(described, mesh, scene.file)
     if refinement > 1:
+        check_one_mesh(scene)
         with told_as(scene, ("mesh", "file"), fem.ModelError, hint=": --meshes"):
             mesh = fem.refined(mesh, refinement)
     with told_as(scene, (), fem.ModelError):
-        return _touching(scene, fem.assemble(_model(scene, mesh)), refinement)
-
-
-def _touching(scene: Scene, component: fem.Component, refinement: int) -> fem.Component:
-    """The component with its load vectors and areas of contact, whose points go with the mesh."""
-    if refinement > 1 and any(isinstance(table.at, str) for table in scene.contact_areas):
-        fault = "go with the mesh: compare modes or methods, not meshes"
-        raise scene_error(scene.file, ("contact_areas",), fault)
-    return with_areas(scene, _loaded(scene, component))
+        component = fem.assemble(_model(described, mesh))
+        return with_areas(scene, _loaded(scene, component))
 
 
 def _loaded(scene: Scene, component: fem.Component) -> fem.Component:

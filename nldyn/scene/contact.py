@@ -13,7 +13,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import scene_error
-from nldyn.scene.schema import ContactAreaTable, Scene
+from nldyn.scene.schema import ContactAreaTable, Scene, exponent_of
 from nldyn.system.contact_area import contact_area, gap_beside
 from nldyn.system.stop import Stop
 
@@ -62,23 +62,33 @@ def with_areas(scene: Scene, component: fem.Component) -> fem.Component:
             continue
         with told_as(scene, key, fem.ModelError, cms.ReductionError, SystemModelError):
             one, vectors = _placed(component, table)
-            area = cms.Area(
-                tuple(one.sides[0] or ()),
-                table.stiffness * np.asarray(one.weights),
-                table.attachment_modes,
-                table.static_error,
-            )
-            shared = {table.called: area} if table.against is None else _both(table, one, area)
-            component = component.with_interfaces(vectors, shared)
+            component = component.with_interfaces(vectors, _attached(table, one))
         found.append(one)
     scene._areas_found = tuple(scene.contact_areas), tuple(found)
     return component
 
 
-def _both(table: ContactAreaTable, one: Found, area: cms.Area) -> dict[str, cms.Area]:
-    """The areas on both sides, which one contact presses."""
-    other = cms.Area(tuple(one.sides[1] or ()), area.stiffness, area.modes, area.tolerance)
-    return {table.called: area, f"{table.called} against": other}
+def check_one_mesh(scene: Scene) -> None:
+    """Refuse to take another mesh where points of contact go with that of the scene."""
+    if any(isinstance(table.at, str) for table in scene.contact_areas):
+        fault = "go with the mesh: compare modes or methods, not meshes"
+        raise scene_error(scene.file, ("contact_areas",), fault)
+
+
+def _names(table: ContactAreaTable) -> tuple[str, str]:
+    """What the reduction calls an area, and the one on the other side."""
+    return table.called, f"{table.called} against"
+
+
+def _attached(table: ContactAreaTable, one: Found) -> dict[str, cms.Area]:
+    """The areas, on both sides if both move, that the reduction gives attachment modes to."""
+    assert one.weights is not None
+    stiffness = table.stiffness * one.weights
+    return {
+        name: cms.Area(tuple(points), stiffness, table.attachment_modes, table.static_error)
+        for name, points in zip(_names(table), one.sides[:2], strict=True)
+        if points is not None
+    }
 
 
 def _listed(table: ContactAreaTable) -> Found:
@@ -164,9 +174,9 @@ def told_of_areas(scene: Scene, reduced: cms.ReducedModel) -> list[str]:
         held = f" ({found.held} more are held by supports)" if found.held else ""
         of = "" if table.points == "nodes" else f" that stand for {found.weights.sum():.4g} m or m²"
         text = f"contact area '{table.called}': {len(found.places)} points{of}{held}"
-        for name, given in reduced.areas.items():
-            if name in (table.called, f"{table.called} against"):
-                side = "" if name == table.called else " on the other side"
+        for name, side in zip(_names(table), ("", " on the other side"), strict=True):
+            if name in reduced.areas:
+                given = reduced.areas[name]
                 text += (
                     f"; {given.modes} attachment modes{side}, static error {given.static_error:.2g}"
                 )
@@ -192,7 +202,7 @@ def area_stops(scene: Scene) -> tuple[Stop, ...]:
                 points,
                 table.stiffness,
                 weights=found.weights,
-                exponent=1.0 if table.law == "linear" else table.exponent or 1.5,
+                exponent=exponent_of(table),
                 gap=found.gaps,
                 direction=table.closes,
                 against=against,

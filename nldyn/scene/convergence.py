@@ -11,6 +11,7 @@ from nldyn.reduction.convergence import METHODS, Component, ConvergenceStudy, co
 from nldyn.reduction.studied import JoinedComponents
 from nldyn.scene.build import AnyComponent, build_reduced, check_held, join, joints_of
 from nldyn.scene.component import build_component
+from nldyn.scene.contact import check_one_mesh
 from nldyn.scene.faults import within_component
 from nldyn.scene.load_case import load_case_of
 from nldyn.scene.matrices import build_matrices
@@ -77,6 +78,7 @@ def convergence_study_of(
             raise SystemModelError("converge: give either refinements or meshes")
         if scene.mesh is None:
             raise SystemModelError("converge: meshes are for a scene of one component with a mesh")
+        check_one_mesh(scene)
         studied = {file: build_component(with_mesh(scene, file)) for file in meshes}
     else:
         studied = {

@@ -8,6 +8,7 @@ from nldyn.base.resources import example
 from nldyn.report.stop_spheres import not_drawn
 from nldyn.scene import build_reduced, build_system, load_scene
 from nldyn.scene.contact import areas_found
+from nldyn.scene.convergence import convergence_study_of
 from nldyn.scene.followed import followed_parameter
 from nldyn.scene.load_case import load_case_of
 
@@ -145,3 +146,5 @@ def test_a_convergence_study_refuses_to_refine_what_the_points_go_with(tmp_path)
     assert len(load_case_of(scene).stops) == 40
     with pytest.raises(SceneError, match="go with the mesh"):
         build_component(scene, refinement=2)
+    with pytest.raises(SceneError, match="go with the mesh"):
+        convergence_study_of(scene, meshes=[scene.mesh.file])

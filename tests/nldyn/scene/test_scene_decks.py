@@ -77,6 +77,18 @@ def test_parts_of_the_deck_are_those_given_by_hand(folder):
     assert np.array_equal(given.frequencies_hz, taken.frequencies_hz)
 
 
+def test_an_area_of_contact_of_parts_of_the_deck_is_that_of_parts_given_by_hand(folder):
+    area = '[[contact_areas]]\nat = "BEAM"\ndirection = "-y"\nstiffness = 1e4\ngap = 1e-3\n'
+    systems = []
+    for name in ("given", "file"):
+        path = folder / f"{name}.toml"
+        path.write_text(path.read_text() + area)
+        systems.append(build_system(load_scene(path)))
+    given, taken = systems
+    assert given.stops == taken.stops and len(taken.area_stops("BEAM")) == 10
+    assert np.array_equal(given.frequencies_hz, taken.frequencies_hz)
+
+
 def test_a_finer_frame_keeps_what_the_deck_attaches(folder):
     finer = build_component(load_scene(folder / "given.toml"), refinement=3)
     assert len(finer.model.mesh.attachments.point_masses) == 1 and finer.damping is not None
