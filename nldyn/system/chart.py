@@ -78,14 +78,8 @@ BOUNDS = {
     name: (0.0, math.inf)
     for name in (
         *("stiffness", "dissipation", "dashpot", *SOURCES, *OF_SLIDERS),
-        *(
-            "area_stiffness",
-            "area_friction",
-            "clearance",
-            "rubbing_friction",
-            *_OF_DAMPERS,
-            *_OF_MODES,
-        ),
+        *("area_stiffness", "area_friction"),
+        *("clearance", "rubbing_friction", *_OF_DAMPERS, *_OF_MODES),
     )
     if name != "force"  # has either sign
 } | {  # between which there are systems

@@ -76,7 +76,7 @@ def rest(system: System) -> Real:
 
 def _off_saddles(system: System, q: Real) -> Real:
     """Where the way goes on from q if a pin holds it there as on a crest, which is no rest."""
-    if all(stop.inside for stop in system.round_stops.values()):
+    if not _has_pins(system):
         return q
     for _ in range(system.size):
         values, vectors = np.linalg.eigh(tangent_stiffness(system, q))
@@ -84,6 +84,11 @@ def _off_saddles(system: System, q: Real) -> Real:
             break
         q = _settled(system, q + FIRST_MOVE * float(np.linalg.norm(q)) * vectors[:, 0])
     return q
+
+
+def _has_pins(system: System) -> bool:
+    """Whether there are pins, beside which the potential is not convex."""
+    return not all(stop.inside for stop in system.round_stops.values())
 
 
 def rest_positions(system: System) -> list[Real]:
@@ -319,7 +324,7 @@ def _way_round(system: System, stop: RoundStop, q: Real, way: Real) -> tuple[flo
 
 def _newton_step(system: System, stiffness: Real, slope: Real) -> Real:
     """Newton's step, with bonds and pins away from maxima, and none where there is no stiffness."""
-    if not system.bonds and all(stop.inside for stop in system.round_stops.values()):
+    if not system.bonds and not _has_pins(system):
         return np.asarray(-np.linalg.lstsq(stiffness, slope, rcond=None)[0])
     values, vectors = np.linalg.eigh(stiffness)
     sizes = np.abs(values)
