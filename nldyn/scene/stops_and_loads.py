@@ -69,12 +69,16 @@ def dry_tables(scene: Scene) -> list[FrictionTable]:
 
 
 def slider_of(scene: Scene, number: int) -> int:
-    """Which of the sliders of a system a table of friction is: those of stops come first."""
+    """Which of the sliders of a system a table of friction is.
+
+    Those of stops come first, then those of areas of contact.
+    """
     stops = sorted(table.stop for table in scene.friction if table.stop is not None)
     table = scene.friction[number]
     if table.stop is not None:
         return stops.index(table.stop)
-    return len(stops) + sum(other.stop is None for other in scene.friction[:number])
+    of_areas = sum(stop.friction is not None for stop in area_stops(scene))
+    return len(stops) + of_areas + len([t for t in scene.friction[:number] if t.stop is None])
 
 
 def _law_of_friction(table: FrictionTable) -> Friction:

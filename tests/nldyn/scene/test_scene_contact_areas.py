@@ -11,6 +11,7 @@ from nldyn.scene.contact import areas_found
 from nldyn.scene.convergence import convergence_study_of
 from nldyn.scene.followed import followed_parameter
 from nldyn.scene.load_case import load_case_of
+from nldyn.system.chart import value_of
 
 LISTED = """
 [modal]
@@ -97,6 +98,17 @@ def test_a_list_of_interfaces_shares_a_law(tmp_path):
     rough = LISTED.replace("gap = [", 'friction = 0.2\nalong = ["slide", "tip"]\ngap = [')
     sliders = build_system(scene_of(tmp_path, rough)).sliders
     assert [(slider.at, slider.stop) for slider in sliders] == [("slide", 0), ("tip", 1)]
+
+
+def test_friction_beside_an_area_with_friction_is_followed_by_its_own_number(tmp_path):
+    rough = LISTED.replace(
+        "participation.slide", "participation.side = [0.9, 0.1, 0.4]\nparticipation.slide"
+    )
+    rough = rough.replace("gap = [", 'friction = 0.2\nalong = ["slide", "tip"]\ngap = [')
+    rough += 'parameter = "friction.0.coefficient"\nrange = [0.1, 0.7]\nfrequency_hz = 1.2\n'
+    rough += '[[friction]]\nat = "side"\ncoefficient = 0.5\nnormal_force = 1.0\n'
+    scene = scene_of(tmp_path, rough.replace("range_hz = [0.5, 2.0]\n", ""))
+    assert value_of(build_system(scene), 1.2, followed_parameter(scene)) == 0.5
 
 
 @pytest.mark.parametrize(
