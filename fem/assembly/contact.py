@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
-from skfem.quadrature import get_quadrature
 
 from fem.assembly.component import Component
-from fem.assembly.structure import beam_dofs, beam_motions
+from fem.assembly.structure import beam_dofs, beam_motions, gauss
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
+from fem.elements.beams import cross_matrix
 from fem.elements.scatter import SparseArray
 from fem.mesh.cells import KINDS
+from fem.model.structure import AXES
 
-AXES = ("x", "y", "z")
 FLAT = 1e-4  # 1 - cosine of the angle between the normals of what counts as flat
 OPPOSITE = 1e-6  # of the length of a line, or of the mesh: how far off a point may lie
 HELD = 1e-12  # motion of a point, of one that is free: a support holds it
@@ -157,7 +157,7 @@ def unit_vector(at: str, direction: str | Sequence[float]) -> FloatArray:
     """The unit vector of an axis, such as "-y", or of a vector."""
     if isinstance(direction, str):
         name = direction.removeprefix("-")
-        if name in AXES:
+        if name in AXES[:3]:
             sign = -1.0 if direction.startswith("-") else 1.0
             return np.asarray(sign * np.eye(3)[AXES.index(name)], dtype=np.float64)
         vector = np.zeros(0)
@@ -206,7 +206,7 @@ def _node_block(component: Component, nodes: IntArray) -> Block:
     dofs = component.numbering.dofs(nodes)[:, :3]
     shapes = np.broadcast_to(np.eye(3), (len(nodes), 1, 3, 3))
     places = component.model.mesh.points[nodes][:, None]
-    return places, np.ones((len(nodes), 1)), np.array(shapes), dofs
+    return places, np.ones((len(nodes), 1)), shapes, dofs
 
 
 def opposite_points(
@@ -259,10 +259,11 @@ def opposite_points(
     True
     """
     mesh, normal = component.model.mesh, points.direction
-    beams = [] if points.measure == "node" else list(_beams_in(component, at))
+    beams = {} if points.measure == "node" else component.model.beams_on(at)
     flat = np.eye(3) - np.outer(normal, normal)
     if beams:
-        ends = np.concatenate([mesh.points[lines] for _, lines, _ in beams]) @ flat
+        lines = [component.model.beams[name][1][numbers] for name, numbers in beams.items()]
+        ends = mesh.points[np.concatenate(lines)] @ flat
         span, away = ends[:, 1] - ends[:, 0], points.places[:, None] @ flat - ends[:, 0]
         length = np.maximum((span**2).sum(axis=1), np.finfo(float).tiny)
         s = np.clip((away * span).sum(axis=2) / length, 0.0, 1.0)
@@ -291,7 +292,7 @@ def opposite_points(
 
 def _on_beams(
     component: Component,
-    beams: Sequence[tuple[str, IntArray, IntArray]],
+    beams: Mapping[str, IntArray],
     chosen: IntArray,
     s: FloatArray,
     arm: FloatArray,
@@ -301,7 +302,7 @@ def _on_beams(
     Lines are counted through all beams.
     """
     first, blocks, order = 0, [], []
-    for name, _, numbers in beams:
+    for name, numbers in beams.items():
         own = np.flatnonzero((chosen >= first) & (chosen < first + len(numbers)))
         if len(own):
             places = s[own, None]
@@ -320,7 +321,11 @@ def _blocks(
     for kind, facets in model.facets_on(at).items():
         blocks.append(_facet_block(component, at, kind, facets, points, normal))
     measure = "length" if model.plane else "area"
-    beams = list(_beam_blocks(component, at, points, surface * normal))
+    s, weights = gauss(points)
+    beams = [
+        _beam_block(component, name, numbers, s, weights, surface * normal)
+        for name, numbers in model.beams_on(at).items()
+    ]
     if blocks and beams:
         raise ModelError(f"{model.mesh.source}: contact at {at!r}: has both facets and beams")
     if not blocks and not beams:
@@ -366,22 +371,6 @@ def _facet_block(
     )
 
 
-def _beam_blocks(component: Component, at: str, points: int, arm: FloatArray) -> Iterator[Block]:
-    s, weights = gauss(points)
-    for name, _, numbers in _beams_in(component, at):
-        yield _beam_block(component, name, numbers, s, weights, arm)
-
-
-def _beams_in(component: Component, at: str) -> Iterator[tuple[str, IntArray, IntArray]]:
-    """Names of beams, those of their lines (e, 2) whose nodes are in a set, and their numbers."""
-    inside = np.zeros(len(component.model.mesh.points), dtype=np.bool_)
-    inside[component.model.mesh.nodes(at)] = True
-    for name, (_, lines) in component.model.beams.items():
-        numbers = np.flatnonzero(inside[lines].all(axis=1))
-        if len(numbers):
-            yield name, lines[numbers], numbers
-
-
 def _beam_block(
     component: Component,
     name: str,
@@ -392,28 +381,19 @@ def _beam_block(
 ) -> Block:
     """Places (q,) or (e, q) from 0 to 1 on lines (e,) of a beam, an arm off its axis."""
     model = component.model
-    part, lines = model.beams[name]
-    ends = model.mesh.points[lines[numbers]]
-    what = f"{model.mesh.source}: part {name!r}"
-    lengths, moves, turns = beam_motions(part, ends[:, 1] - ends[:, 0], what, s)
-    lever = np.array([np.cross(axis, arm) for axis in np.eye(3)])
-    shapes = moves + np.einsum("ji,eqja->eqia", lever, turns)
+    ends = model.mesh.points[model.beams[name][1][numbers]]
+    lengths, moves, turns = beam_motions(model, name, numbers, s)
+    shapes = moves - cross_matrix(arm) @ turns
     share = np.broadcast_to(s, (len(ends), s.shape[-1]))[..., None]
     places = (1.0 - share) * ends[:, None, 0] + share * ends[:, None, 1]
     dofs = beam_dofs(model, component.numbering, name)[numbers]
     return places + arm, weights * lengths[:, None], shapes, dofs
 
 
-def gauss(points: int) -> tuple[FloatArray, FloatArray]:
-    """Gauss's places on [0, 1] and their weights."""
-    places, weights = np.polynomial.legendre.leggauss(points)
-    return (places + 1.0) / 2.0, weights / 2.0
-
-
 def rule(kind: str, points: int) -> tuple[FloatArray, FloatArray]:
     """Places (q, d) and positive weights (q,) on a facet, so many in each direction."""
     for order in range(2 * points - 1, 2 * points + 4):
-        places, weights = get_quadrature(KINDS[kind].element, order)
+        places, weights = KINDS[kind].rule(order)
         if np.all(weights > 0.0):
             break
-    return np.ascontiguousarray(places.T), weights
+    return places, weights

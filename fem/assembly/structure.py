@@ -76,12 +76,8 @@ def rigid_motions_of(model: StructureModel, numbering: Numbering) -> FloatArray:
 def attached_rows(model: StructureModel, numbering: Numbering) -> Iterator[Rows]:
     """Rows of the natural form of beams, springs and foundations."""
     size = 3 * numbering.count
-    for name, (part, lines) in model.beams.items():
-        spans = model.mesh.points[lines[:, 1]] - model.mesh.points[lines[:, 0]]
-        what = f"{model.mesh.source}: part {name!r}"
-        rows, stiffness = element_rows(
-            along(part, model.mesh, lines, what), spans, what, model.plane
-        )
+    for name, part, spans, what in _beams(model):
+        rows, stiffness = element_rows(part, spans, what, model.plane)
         yield line_rows(rows, stiffness, beam_dofs(model, numbering, name), size, 3)
     elongations, given, _ = _link_rows(model, numbering)
     if given.any():
@@ -97,11 +93,8 @@ def attached_matrices(
     """Stiffness and mass of beams, springs, foundations and lumped masses."""
     size = 3 * numbering.count
     stiffness, mass = [], []
-    for name, (part, lines) in model.beams.items():
-        points = model.mesh.points
-        spans = points[lines[:, 1]] - points[lines[:, 0]]
-        what = f"{model.mesh.source}: part {name!r}"
-        K, M = element_matrices(along(part, model.mesh, lines, what), spans, what, model.plane)
+    for name, part, spans, what in _beams(model):
+        K, M = element_matrices(part, spans, what, model.plane)
         dofs = beam_dofs(model, numbering, name)
         stiffness.append((K, dofs))
         mass.append((M, dofs))
@@ -112,6 +105,17 @@ def attached_matrices(
     elongations, given, _ = _link_rows(model, numbering)
     linked = squares(elongations, given)
     return added(dense_scatter(stiffness, size), linked), dense_scatter(mass, size)
+
+
+def _beams(model: StructureModel) -> Iterator[tuple[str, BeamPart, FloatArray, str]]:
+    """Names of beams, their parts along their lines, the spans (e, 3) of these, and what to say."""
+    for name, (part, lines) in model.beams.items():
+        what = f"{model.mesh.source}: part {name!r}"
+        yield name, along(part, model.mesh, lines, what), _spans(model, lines), what
+
+
+def _spans(model: StructureModel, lines: IntArray) -> FloatArray:
+    return np.asarray(model.mesh.points[lines[:, 1]] - model.mesh.points[lines[:, 0]])
 
 
 def beam_dofs(model: StructureModel, numbering: Numbering, name: str) -> IntArray:
@@ -206,34 +210,31 @@ def _facet_foundation(
 def _beam_foundation(
     model: StructureModel, numbering: Numbering, face: str, stiffness: Sequence[float]
 ) -> Iterator[tuple[FloatArray, IntArray]]:
-    inside = np.zeros(len(model.mesh.points), dtype=np.bool_)
-    inside[model.mesh.nodes(face)] = True
-    for name, (part, lines) in model.beams.items():
-        on = inside[lines].all(axis=1)
-        if on.any():
-            ends = model.mesh.points[lines[on]]
-            what = f"{model.mesh.source}: part {name!r}"
-            spans = ends[:, 1] - ends[:, 0]
-            lengths, N, _ = beam_motions(part, spans, what, BEAM_PLACES)
-            weights = BEAM_WEIGHTS[None, :] * lengths[:, None]
-            K = np.einsum("eq,eqia,i,eqib->eab", weights, N, stiffness, N, optimize=True)
-            yield K, beam_dofs(model, numbering, name)[on]
+    places, shares = gauss(4)
+    for name, on in model.beams_on(face).items():
+        lengths, N, _ = beam_motions(model, name, on, places)
+        weights = shares[None, :] * lengths[:, None]
+        K = np.einsum("eq,eqia,i,eqib->eab", weights, N, stiffness, N, optimize=True)
+        yield K, beam_dofs(model, numbering, name)[on]
 
 
-BEAM_PLACES, BEAM_WEIGHTS = (
-    (np.polynomial.legendre.leggauss(4)[0] + 1.0) / 2.0,
-    np.polynomial.legendre.leggauss(4)[1] / 2.0,
-)
+def gauss(points: int) -> tuple[FloatArray, FloatArray]:
+    """Gauss's places on [0, 1] and their weights."""
+    places, weights = np.polynomial.legendre.leggauss(points)
+    return (places + 1.0) / 2.0, weights / 2.0
 
 
 def beam_motions(
-    part: BeamPart, spans: FloatArray, what: str, places: FloatArray
+    model: StructureModel, name: str, numbers: IntArray, places: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Lengths (e,) of beams, and translations and rotations of their axes, each (e, q, 3, 12).
+    """Lengths (e,) of lines of a beam, and translations and rotations of their axes (e, q, 3, 12).
 
-    At places (q,), or (e, q), from 0 to 1 along lines with spans (e, 3) between their nodes, by the
-    translations and rotations of these; in x, y and z.
+    At places (q,), or (e, q), from 0 to 1 along the lines of these numbers (e,), by the
+    translations and rotations of their nodes; in x, y and z.
     """
+    part, lines = model.beams[name]
+    spans = _spans(model, lines[numbers])
+    what = f"{model.mesh.source}: part {name!r}"
     axes = local_axes(part, spans, what)
     lengths = np.linalg.norm(run(part, spans, what), axis=1)
     ends = to_nodes(part, axes)

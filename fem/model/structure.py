@@ -279,14 +279,24 @@ class StructureModel:
 
     def facets_on(self, name: str) -> dict[str, IntArray]:
         """The outer facets, and those of shells, all of whose nodes are in a point set or group."""
-        inside = np.zeros(len(self.mesh.points), dtype=np.bool_)
-        inside[self.mesh.nodes(name)] = True
+        inside = self._inside(name)
         found: dict[str, list[IntArray]] = {}
         for kinds in (self.facets, *(kinds for _, kinds in self.shells.values())):
             for kind, facets in kinds.items():
                 found.setdefault(kind, []).append(facets[inside[facets].all(axis=1)])
         on = {kind: np.concatenate(blocks) for kind, blocks in found.items()}
         return {kind: facets for kind, facets in on.items() if len(facets)}
+
+    def beams_on(self, name: str) -> dict[str, IntArray]:
+        """Numbers of the lines of beam parts both of whose nodes are in a point set or group."""
+        inside = self._inside(name)
+        on = {beam: inside[lines].all(axis=1) for beam, (_, lines) in self.beams.items()}
+        return {beam: np.flatnonzero(lines) for beam, lines in on.items() if lines.any()}
+
+    def _inside(self, name: str) -> npt.NDArray[np.bool_]:
+        inside = np.zeros(len(self.mesh.points), dtype=np.bool_)
+        inside[self.mesh.nodes(name)] = True
+        return inside
 
     def _check_parts(self) -> None:
         mesh = self.mesh
