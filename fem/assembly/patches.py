@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy import sparse
 
 from fem.base.arrays import FloatArray, IntArray
+from fem.elements.shells import unit
 
 THIN = 2.0
 """Ratio of the squares of two lengths of cells from which a patch is thin."""
@@ -73,9 +74,8 @@ class Patches:
         found[..., 2] /= self.height[at][:, None]
         slope = c[..., 1] + 2.0 * c[..., 3] * x + c[..., 4] * y
         rise = c[..., 2] + c[..., 4] * x + 2.0 * c[..., 5] * y
-        normal = _unit(np.stack([-slope, -rise, np.ones_like(x)], axis=-1))
-        first = np.stack([np.ones_like(x), np.zeros_like(x), slope], axis=-1)
-        first = _unit(first)
+        normal = unit(np.stack([-slope, -rise, np.ones_like(x)], axis=-1))
+        first = unit(np.stack([np.ones_like(x), np.zeros_like(x), slope], axis=-1))
         turned = np.stack([first, np.cross(normal, first), normal], axis=-2)
         return found, turned @ self.axes[at][:, None]
 
@@ -195,7 +195,3 @@ def _sums(at: IntArray, values: FloatArray, count: int) -> FloatArray:
     into = sparse.csr_array((np.ones(len(at)), (at, np.arange(len(at)))), shape=(count, len(at)))
     found = np.asarray(into @ values.reshape(len(at), -1))
     return np.asarray(found.reshape(count, *values.shape[1:]), dtype=np.float64)
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

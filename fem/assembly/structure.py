@@ -24,7 +24,6 @@ from fem.elements.beams import (
     cross_matrix,
     element_matrices,
     element_rows,
-    hermite,
     local_axes,
     run,
     to_nodes,
@@ -42,6 +41,7 @@ from fem.elements.scatter import (
     dense_scatter,
     squares,
 )
+from fem.elements.straight_beams import hermite
 from fem.elements.tapers import along
 from fem.mesh.attachments import PointMass
 from fem.model.parts import BeamPart

@@ -276,16 +276,6 @@ def to_nodes(part: BeamPart, axes: FloatArray) -> FloatArray:
     return T
 
 
-def hermite(s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Hermite's four cubics at places (..., q) on [0, 1], and their slopes, each (4, ..., q).
-
-    Those of rotations are to be multiplied by the length.
-    """
-    values = (1 - 3 * s**2 + 2 * s**3, s - 2 * s**2 + s**3, 3 * s**2 - 2 * s**3, s**3 - s**2)
-    slopes = (6 * s**2 - 6 * s, 1 - 4 * s + 3 * s**2, 6 * s - 6 * s**2, 3 * s**2 - 2 * s)
-    return np.array(values), np.array(slopes)
-
-
 def cross_matrix(vectors: FloatArray) -> FloatArray:
     """The matrices [a]x of vectors a (..., 3), so that [a]x b is the cross product of a and b."""
     x, y, z = np.moveaxis(vectors, -1, 0)

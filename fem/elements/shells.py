@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from skfem.quadrature import get_quadrature
 
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
@@ -65,9 +64,14 @@ def flat_cells(corners: FloatArray) -> FlatCells:
     return FlatCells(axes, local[..., :2], local[..., 2])
 
 
+def facet_rule(kind: CellKind) -> tuple[FloatArray, FloatArray]:
+    """Places (q, 2) and weights (q,) of a facet's bending and mass."""
+    return kind.rule(ORDERS[kind.name])
+
+
 def unit(vectors: FloatArray) -> FloatArray:
-    """Vectors (e, 3) of length 1, or of zeros."""
-    length = np.linalg.norm(vectors, axis=1)[:, None]
+    """Vectors (..., 3) of length 1, or of zeros."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(vectors / np.where(length > 0.0, length, 1.0), dtype=np.float64)
 
 
@@ -131,11 +135,8 @@ def local_rows(
 ) -> tuple[FloatArray, FloatArray]:
     """Deformations (e, r, b, 6) of flat facets and their stiffness (e, r), in local axes."""
     if part.section is not None:
-        places, weights = get_quadrature(kind.element, ORDERS[kind.name])
         pieces = TRIANGLES[kind.name]
-        return section_rows(
-            part.section, kind, plane, angles, pieces, (places.T, weights), reduction
-        )
+        return section_rows(part.section, kind, plane, angles, pieces, facet_rule(kind), reduction)
     nu = part.material.poissons_ratio_for("shell part")
     count, b = plane.shape[:2]
     rows, stiffness = [], []
@@ -146,9 +147,9 @@ def local_rows(
         block[:, :, np.array(at)[:, None], [0, 1, 5]] = own.reshape(count, -1, 3, 3)
         rows.append(block)
         stiffness.append(weight)
-    places, weights = get_quadrature(kind.element, ORDERS[kind.name])
+    places, weights = facet_rule(kind)
     law = plane_law(part.stretching * part.thickness**2 / 12.0, nu)
-    bent, weight = plate_rows(kind, plane, places.T, weights, law, part.shearing)
+    bent, weight = plate_rows(kind, plane, places, weights, law, part.shearing)
     block = np.zeros((count, bent.shape[1], b, 6))
     block[..., 2:5] = bent.reshape(count, -1, b, 3)
     return np.concatenate([*rows, block], axis=1), np.concatenate([*stiffness, weight], axis=1)
@@ -160,9 +161,9 @@ def local_mass(part: ShellPart, kind: CellKind, plane: FloatArray) -> FloatArray
     Rotations about the normal have that inertia against the turn of the cell in its plane alone,
     so that a rigid body has its own.
     """
-    places, weights = get_quadrature(kind.element, ORDERS[kind.name])
-    values, slopes = kind.basis(places.T)
-    J = jacobians(kind, plane, places.T)
+    places, weights = facet_rule(kind)
+    values, slopes = kind.basis(places)
+    J = jacobians(kind, plane, places)
     volume = np.linalg.det(J) * weights
     products = np.einsum("eq,qa,qc->eac", volume, values, values, optimize=True)
     mass, inertia = part.mass, part.inertia

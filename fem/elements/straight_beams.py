@@ -158,10 +158,9 @@ def _turn_integrals(lengths: FloatArray, factor: FloatArray, turn: FloatArray) -
     """Integrals (e, 4) of the slope w' times a factor, from (w, rotation) at both ends."""
     if factor.ndim == 1:
         return np.asarray(factor[:, None] * np.array([-1.0, 0.0, 1.0, 0.0]), dtype=np.float64)
-    s, L = PLACES, lengths[:, None]
-    cubic = np.stack([6 * s**2 - 6 * s, 1 - 4 * s + 3 * s**2, 6 * s - 6 * s**2, 3 * s**2 - 2 * s])
-    found = (factor * WEIGHTS) @ cubic.T
-    found[:, [1, 3]] *= L
+    _, slopes = hermite(PLACES)
+    found = (factor * WEIGHTS) @ slopes.T
+    found[:, [1, 3]] *= lengths[:, None]
     return np.asarray(np.einsum("ei,eij->ej", found, turn), dtype=np.float64)
 
 
@@ -201,6 +200,16 @@ def bending_numbers(
     lever = 3.0 * (2.0 * PLACES - 1.0)
     mixed = -mean(bending_stiffness * lever) / lengths
     return own, mixed, mean(bending_stiffness * lever**2) / lengths
+
+
+def hermite(s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Hermite's four cubics at places (..., q) on [0, 1], and their slopes, each (4, ..., q).
+
+    Those of rotations are to be multiplied by the length.
+    """
+    values = (1 - 3 * s**2 + 2 * s**3, s - 2 * s**2 + s**3, 3 * s**2 - 2 * s**3, s**3 - s**2)
+    slopes = (6 * s**2 - 6 * s, 1 - 4 * s + 3 * s**2, 6 * s - 6 * s**2, 3 * s**2 - 2 * s)
+    return np.array(values), np.array(slopes)
 
 
 def congruent(matrices: FloatArray, T: FloatArray) -> FloatArray:

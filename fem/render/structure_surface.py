@@ -11,7 +11,8 @@ import numpy as np
 from fem.assembly.component import Component
 from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
-from fem.elements.beams import hermite, local_axes, run, to_nodes
+from fem.elements.beams import local_axes, run, to_nodes
+from fem.elements.straight_beams import hermite
 from fem.elements.tapers import along
 from fem.elements.trusses import chords
 from fem.mesh.cells import KINDS, SPANS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fem
-from fem.elements.beams import hermite
+from fem.elements.straight_beams import hermite
 from fem.render.structure_surface import local_deflection, reflected, structure_surface
 from fem.render.swept import outline
 
