@@ -13,26 +13,25 @@ from fem.model.parts import ShellPart
 from fem.model.structure import SolidCells, StructureModel
 
 
-def part_errors(
-    model: StructureModel, shapes: FloatArray
-) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Twice the energy too much and the mass too little, (m,) each, of parts in shapes (m, n, 6).
+def energy_and_mass_off(model: StructureModel, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Twice the energy too much and the mass too little, (m,) each, in shapes (m, n, 6).
 
     Beams and trusses have none here, nor have shells with a section of their own.
     """
-    found = {}
+    stiffer, lighter = np.zeros((2, len(shapes)))
     pieces: dict[str, list[SolidCells]] = {}
     for piece in model.solid_cells:
         pieces.setdefault(piece.name, []).append(piece)
-    for name, solids in pieces.items():
-        found[name] = solid_errors(model.mesh, solids, shapes), np.zeros(len(shapes))
-    names = {id(part): name for name, (part, _) in model.shells.items()}
+    for solids in pieces.values():
+        stiffer += solid_errors(model.mesh, solids, shapes)
     shells = list(shell_pieces(model))
     corners = smooth_corners(model.mesh.points, [nodes for _, _, nodes, _ in shells])
     facets: dict[int, tuple[ShellPart, list[tuple[CellKind, IntArray, FloatArray, IntArray]]]] = {}
     for (part, kind, nodes, normals), own in zip(shells, corners, strict=True):
         if part.section is None:
             facets.setdefault(id(part), (part, []))[1].append((kind, nodes, normals, own))
-    for key, (part, blocks) in facets.items():
-        found[names[key]] = shell_errors(model.mesh.points, part, blocks, shapes)
-    return found
+    for part, blocks in facets.values():
+        energy, mass = shell_errors(model.mesh.points, part, blocks, shapes)
+        stiffer += energy
+        lighter += mass
+    return stiffer, lighter

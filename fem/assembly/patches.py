@@ -23,6 +23,8 @@ THIN = 2.0
 FLAT_RIDGE = 1e-11
 CURVED_RIDGE = 1e-9
 """Of the trace of the normal equations: hold what the nodes of a patch do not determine."""
+SURE = 4
+"""Power of how well determined the fit of a patch is: its weight beside its neighbours'."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,17 +16,15 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from fem.assembly.patches import Patches, fitted, patches_of
+from fem.assembly.patches import SURE, Patches, fitted, patches_of
 from fem.base.arrays import FloatArray, IntArray
 from fem.elements.membranes import plane_law
 from fem.elements.plates import jacobians
-from fem.elements.shells import ORDERS, TRIANGLES, FlatCells, flat_cells, shell_rows
+from fem.elements.shells import TRIANGLES, FlatCells, facet_rule, flat_cells, shell_rows
 from fem.mesh.cells import CellKind
 from fem.model.parts import ShellPart
 
 RIDGE = np.array([1e-9, 1e-4, 1e-4])
-SURE = 4
-"""As for solids."""
 SMOOTH_DEGREES = 50.0
 """Facets that meet at less than this angle bend as one surface: a ring of 8 still does."""
 MIDDLE = {"triangle": np.full((1, 2), 1.0 / 3.0), "quad": np.full((1, 2), 0.5)}
@@ -40,8 +38,10 @@ class Facets:
     ----------
     kind, nodes, corners, cells
         What they are; corners as of `smooth_corners`.
+    values
+        Shape functions at the places of integration, (q, b).
     area
-        At the places of integration in m², shape (e, q).
+        At the same places in m², shape (e, q).
     own
         Curvatures xx, yy, 2 xy and transverse shear strains (m, e, q, 5) in the facets' axes.
     deflection
@@ -52,6 +52,7 @@ class Facets:
     nodes: IntArray
     corners: IntArray
     cells: FlatCells
+    values: FloatArray
     area: FloatArray
     own: FloatArray
     deflection: FloatArray
@@ -96,7 +97,7 @@ def shell_errors(
             more = _across(patches, each, fits, parabola)
             energy -= _energy(each, law, more, 2.0 * each.own + more)
         bent = each.own[..., :3].mean(axis=2)
-        lift = np.einsum("eqs,mes->meq", parabola, bent * [0.5, 0.5, 0.5])
+        lift = np.einsum("eqs,mes->meq", parabola, bent / 2.0)
         mass += part.mass * np.einsum("eq,meq->m", each.area, lift * (2.0 * each.deflection + lift))
     return energy, mass
 
@@ -182,22 +183,16 @@ def _facets(
     bending = rows[:, 6 * len(TRIANGLES[kind.name]) :]
     moved = shapes[:, nodes].reshape(len(shapes), len(nodes), -1)
     own = np.einsum("erj,mej->mer", bending, moved).reshape(*moved.shape[:2], -1, 5)
-    places, weights = kind.rule(ORDERS[kind.name])
+    places, weights = facet_rule(kind)
     area = np.linalg.det(jacobians(kind, cells.plane, places)) * weights
     if kind.name == "triangle":
         mean = np.einsum("eq,meqr->mer", area, own) / area.sum(axis=1)[:, None]
         own = np.broadcast_to(mean[:, :, None], own.shape)
-    own = np.stack(
-        [
-            (own[..., 0] + own[..., 1]) / 2,
-            (own[..., 0] - own[..., 1]) / 2,
-            *np.moveaxis(own, -1, 0)[2:],
-        ],
-        axis=-1,
-    )
+    own = _split(own)
+    own[..., :2] /= 2.0
     values, _ = kind.basis(places)
     along = np.einsum("mebi,ei->meb", shapes[:, nodes, :3], cells.axes[:, 2])
-    return Facets(kind, nodes, corners, cells, area, own, along @ values.T)
+    return Facets(kind, nodes, corners, cells, values, area, own, along @ values.T)
 
 
 def _turns(
@@ -206,9 +201,8 @@ def _turns(
     """Terms (e, q, 3), turns (e, 2, 2) from the facets' planes to patches, and sides (e,)."""
     corners = facets.corners[:, column]
     at, _ = patches.coordinates(corners, places)
-    middle = facets.cells
     _, axes = patches.coordinates(corners, places.mean(axis=1, keepdims=True))
-    turn = axes[:, 0] @ middle.axes.swapaxes(1, 2)
+    turn = axes[:, 0] @ facets.cells.axes.swapaxes(1, 2)
     side = np.sign(turn[:, 2, 2])
     left, _, right = np.linalg.svd(turn[:, :2, :2])
     terms = np.stack([np.ones_like(at[..., 0]), at[..., 0], at[..., 1]], axis=-1)
@@ -262,7 +256,7 @@ def _smooth(
     points: FloatArray, patches: Patches, facets: Facets, fits: FloatArray, trust: FloatArray
 ) -> FloatArray:
     """Smooth curvatures and shears (m, e, q, 5) of facets, in their axes."""
-    values, _ = facets.kind.basis(facets.kind.rule(ORDERS[facets.kind.name])[0])
+    values = facets.values
     places = values @ points[facets.nodes]
     total, whole = np.zeros(facets.own.shape), np.zeros(facets.area.shape)
     for number, column in enumerate(facets.corners.T):
@@ -277,8 +271,7 @@ def _smooth(
 
 def _between(facets: Facets) -> FloatArray:
     """x², y² and x y between the nodes less themselves, (e, q, 3)."""
-    values, _ = facets.kind.basis(facets.kind.rule(ORDERS[facets.kind.name])[0])
-    at = facets.cells.plane
+    values, at = facets.values, facets.cells.plane
     there = values @ at
     products = [(0, 0), (1, 1), (0, 1)]
     found = [

@@ -14,12 +14,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fem.assembly.patches import Patches, fitted, patches_of
+from fem.assembly.patches import SURE, Patches, fitted, patches_of
 from fem.assembly.solids import unseen_rows
 from fem.base.arrays import FloatArray, IntArray
 from fem.elements.shells import unit
 from fem.elements.solids import gradients_and_volumes
-from fem.mesh.cells import KINDS, CellKind
+from fem.mesh.cells import CellKind
 from fem.mesh.structure_mesh import StructureMesh
 from fem.model.structure import SolidCells
 
@@ -31,8 +31,6 @@ RIDGE = {
     2: np.array([1e-9] + [1e-8] * 3 + [1e-4] * 9),
 }
 """For `fitted`, by the order of cells: slopes are asked for before what is of higher order."""
-SURE = 4
-"""Power of how well determined the fit of a patch is: its weight beside its neighbours'."""
 INNER = 1e-3
 """Weight of patches at the edge of a notch beside that of others."""
 NOTCH_DEGREES = 230.0, 350.0
@@ -65,7 +63,7 @@ def solid_errors(
     trust[patches.place[inner_corners(mesh.points, pieces)]] *= INNER
     found = np.zeros(len(shapes))
     for piece in pieces:
-        found += _off(piece, mesh, shapes, patches, fits, trust)
+        found += _off(piece, mesh, shapes, patches, fits, trust, order)
     return found
 
 
@@ -203,20 +201,23 @@ def _off(
     patches: Patches,
     fits: FloatArray,
     trust: FloatArray,
+    order: int,
 ) -> FloatArray:
     """Twice the energy (m,) of the differences of a piece's own strains and the smooth ones."""
-    kind, order = piece.kind, 1 if fits.shape[1] == len(RIDGE[1]) else 2
+    kind = piece.kind
     at, weights = kind.quadrature
     own_at = kind.reduced_quadrature[0] if piece.reduced else at
-    between = _linear(kind, at) @ np.linalg.inv(_linear(kind, own_at)) if piece.reduced else None
-    shares, first, mu = _linear(kind, at), *piece.part.lame
+    linear = kind.of_first_order
+    shares, first, mu = linear.basis(at)[0], *piece.part.lame
+    between = shares @ np.linalg.inv(linear.basis(own_at)[0]) if piece.reduced else None
     found = np.zeros(len(shapes))
     for batch in _batches(piece, shapes):
         nodes = piece.nodes[batch]
-        gradients, _ = _gradients(kind, mesh.points[nodes], own_at)
+        gradients, volume = _gradients(kind, mesh.points[nodes], own_at)
         off = -_strains(gradients, shapes[:, nodes, :3])
         if between is not None:
             off = np.einsum("pq,eqrm->eprm", between, off, optimize=True)
+            _, volume = _gradients(kind, mesh.points[nodes], at)
         off += _smooth(
             nodes[:, : len(kind.corners)],
             kind.basis(at)[0] @ mesh.points[nodes],
@@ -226,8 +227,7 @@ def _off(
             trust,
             order,
         )
-        volume = np.abs(_gradients(kind, mesh.points[nodes], at)[1]) * weights
-        volume *= piece.part.thickness or 1.0
+        volume = np.abs(volume) * weights * (piece.part.thickness or 1.0)
         density = first * off[:, :, :3].sum(axis=2) ** 2
         density += 2.0 * mu * np.einsum("r,eqrm->eqm", TWICE, off**2)
         found += np.einsum("eq,eqm->m", volume, density)
@@ -236,13 +236,6 @@ def _off(
             unseen = np.einsum("erbi,mebi->mer", rows, shapes[:, nodes, : kind.dimension])
             found += np.einsum("er,mer->m", stiffness, unseen**2)
     return found
-
-
-def _linear(kind: CellKind, at: FloatArray) -> FloatArray:
-    """Linear functions (q, c) of the corners of cells of a kind."""
-    names = {(2, 3): "triangle", (2, 4): "quad", (3, 4): "tetra", (3, 5): "pyramid"}
-    names |= {(3, 6): "wedge", (3, 8): "hexahedron"}
-    return KINDS[names[kind.dimension, len(kind.corners)]].basis(at)[0]
 
 
 def _smooth(

@@ -142,6 +142,11 @@ class CellKind:
         return self.shape.edges
 
     @property
+    def of_first_order(self) -> CellKind:
+        """The kind of the same shape whose only nodes are the corners."""
+        return next(kind for kind in KINDS.values() if kind.order == 1 and kind.shape is self.shape)
+
+    @property
     def node_count(self) -> int:
         """Number of nodes of one cell."""
         return len(self.nodes)

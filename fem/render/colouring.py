@@ -150,9 +150,9 @@ def cell_stresses(
 @cache
 def _from_places(kind: str) -> FloatArray:
     """Values at the nodes (b, q) from those at the places of reduced integration."""
-    linear = KINDS["quad" if KINDS[kind].dimension == 2 else "hexahedron"]
-    at_places, _ = linear.basis(KINDS[kind].reduced_quadrature[0])
-    at_nodes, _ = linear.basis(KINDS[kind].nodes)
+    cell = KINDS[kind]
+    at_places, _ = cell.of_first_order.basis(cell.reduced_quadrature[0])
+    at_nodes, _ = cell.of_first_order.basis(cell.nodes)
     return np.asarray(at_nodes @ np.linalg.inv(at_places), dtype=np.float64)
 
 
