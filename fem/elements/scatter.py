@@ -76,8 +76,11 @@ def dense_scatter(pieces: Iterable[tuple[FloatArray, IntArray]], count: int) -> 
     """Sum of matrices (e, m, m) at degrees of freedom (e, m), of all pieces, (count, count)."""
     entries = [(np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int64))]
     for matrices, dofs in pieces:
-        cell, row, column = np.nonzero(matrices)
-        entries.append((matrices[cell, row, column], dofs[cell, row], dofs[cell, column]))
+        there = matrices != 0.0
+        places = (
+            np.broadcast_to(at, there.shape)[there] for at in (dofs[:, :, None], dofs[:, None])
+        )
+        entries.append((matrices[there], *places))
     values, rows, columns = map(np.concatenate, zip(*entries, strict=True))
     full = sparse.coo_array((values, (rows, columns)), shape=(count, count))
     return sparse.csr_array(full.tocsr())
