@@ -303,7 +303,7 @@ def _beams(
 ) -> Iterator[tuple[str, PartSurface]]:
     for name, (part, lines) in swept_parts(component.model).items():
         shape = outline(along(part, component.model.mesh, lines, f"part {name!r}", s).section)
-        yield name, PartSurface(np.arange(len(lines)), shape, s, open_ends(lines, joined))
+        yield name, PartSurface(len(lines), shape, s, open_ends(lines, joined))
 
 
 def drawn_facets(component: Component) -> dict[str, IntArray]:

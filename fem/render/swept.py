@@ -37,12 +37,12 @@ def outline(section: CrossSection | SectionRun) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class PartSurface:
-    """Elements of one part, each with its outline at m places: points (e, m, k) in this order.
+    """A number of elements of one part, each with its outline at m places: points (e, m, k).
 
     The outline is the same everywhere, (k, 2), or is given at each place, (e, m, k, 2).
     """
 
-    elements: IntArray
+    count: int
     outline: FloatArray
     places: FloatArray
     open_ends: tuple[tuple[int, int], ...]
@@ -50,7 +50,7 @@ class PartSurface:
     @property
     def shape(self) -> tuple[int, int, int]:
         """Elements, places along each, corners of the outline."""
-        return len(self.elements), len(self.places), self.outline.shape[-2]
+        return self.count, len(self.places), self.outline.shape[-2]
 
     def faces(self) -> Iterator[IntArray]:
         """Arrays of polygons, (f, 4) for the sides and (1, k) for each open end."""
