@@ -364,9 +364,7 @@ static void find_event(const Motion *M, int kind, double phase, double h, int st
 static bool held_open(const Motion *M, int stop)
 {
     for (int s = 0; s < M->fl->n_stops; s++)
-        if (is_slider(M->fl, s) && M->closed[s] && is_held(M->fl, s) &&
-            moves_with(M->fl, s, stop))
-            return true;
+        if (is_stuck(M, s) && moves_with(M->fl, s, stop)) return true;
     return false;
 }
 

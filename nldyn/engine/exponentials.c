@@ -155,23 +155,22 @@ static void fill_there_and_back(const double *block, const double *times, int m,
     }
 }
 
-/* advance a state (2n,) in place by a flight of duration t */
-static void fly_state(const double *blocks, int n, double *w, double t)
-{
-    for (int b = 0; b < n; b++) {
-        Square e = block_exponential(blocks + 4 * b, t);
-        double x = w[2 * b], y = w[2 * b + 1];
-        w[2 * b] = e.a * x + e.b * y;
-        w[2 * b + 1] = e.c * x + e.d * y;
-    }
-}
-
 /* move a pair of coordinates */
 static void move_pair(Square by, double *pair)
 {
     double x = pair[0], y = pair[1];
     pair[0] = by.a * x + by.b * y;
     pair[1] = by.c * x + by.d * y;
+}
+
+/* the same of two rows (count,) */
+static void move_rows(Square by, double *restrict first, double *restrict second, int count)
+{
+    for (int c = 0; c < count; c++) {
+        double x = first[c], y = second[c];
+        first[c] = by.a * x + by.b * y;
+        second[c] = by.c * x + by.d * y;
+    }
 }
 
 /* product of two matrices */
@@ -181,17 +180,18 @@ static Square times(Square a, Square b)
                     a.c * b.b + a.d * b.d};
 }
 
+/* advance a state (2n,) in place by a flight of duration t */
+static void fly_state(const double *blocks, int n, double *w, double t)
+{
+    for (int b = 0; b < n; b++) move_pair(block_exponential(blocks + 4 * b, t), w + 2 * b);
+}
+
 /* advance sensitivities (2n, n_columns) in place by a flight of duration t */
 static void fly_columns(const double *blocks, int n, double *columns, int n_columns, double t)
 {
     for (int b = 0; b < n; b++) {
-        Square e = block_exponential(blocks + 4 * b, t);
-        double *first = columns + (size_t)2 * b * n_columns, *second = first + n_columns;
-        for (int c = 0; c < n_columns; c++) {
-            double x = first[c], y = second[c];
-            first[c] = e.a * x + e.b * y;
-            second[c] = e.c * x + e.d * y;
-        }
+        double *first = columns + (size_t)2 * b * n_columns;
+        move_rows(block_exponential(blocks + 4 * b, t), first, first + n_columns, n_columns);
     }
 }
 

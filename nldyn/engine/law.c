@@ -43,6 +43,12 @@ static bool is_held(const Flow *fl, int s)
     return is_rigid(fl, s) || (is_slider(fl, s) && fl->slides[s] == 0 && !is_sprung(fl, s));
 }
 
+/* whether a slider is held by friction at present */
+static bool is_stuck(const Motion *M, int s)
+{
+    return M->closed[s] && is_slider(M->fl, s) && is_held(M->fl, s);
+}
+
 /* whether a row is the first direction of a round clearance, or the second */
 static bool is_round(const Flow *fl, int s) { return stop_of(fl, s)->second >= 0.0; }
 
@@ -204,6 +210,15 @@ static bool is_number_of(const Flow *fl, int c, int s)
 static bool is_parameter(const Flow *fl, int c, int64_t column, int stop)
 {
     return fl->parameters[2 * c] == column && is_number_of(fl, c, stop);
+}
+
+/* fill sensitivities (n_columns,) of a penetration at present, a time t after the start */
+static void depth_columns(const Motion *M, int stop, double phase, double t, double *found)
+{
+    const Flow *fl = M->fl;
+    output_columns(fl, stop, 0, phase, t, M->columns, M->n_columns, found);
+    for (int c = 0; c < fl->n_parameters; c++)
+        if (is_parameter(fl, c, GAP, stop)) found[fl->size + c] -= 1.0;
 }
 
 /* change of a stop's number in a column with column c of the parameters, which is that number of

@@ -306,12 +306,14 @@ static void guess_rates(const Flow *fl, Panel *panel, Scratch *s)
 static double rounded_force(const Flow *fl, const Panel *panel, const double *force, int a, int i)
 {
     int na = panel->na, width = na * panel->m, height = panel->outputs * panel->m;
-    int partner = panel->round ? partner_of(fl, panel, a) : -1;
     double error = 0.0;
-    for (int o = a; o < panel->outputs && panel->many; o += na)
-        error += BLIND * SUM_ROUNDING * fabs(panel->output[o * panel->m + i] *
-                                             panel->slope[o * panel->m + i]);
-    if (panel->many) return error;
+    if (panel->many) { /* without influences: by what the outputs are */
+        for (int o = a; o < panel->outputs; o += na)
+            error += BLIND * SUM_ROUNDING * fabs(panel->output[o * panel->m + i] *
+                                                 panel->slope[o * panel->m + i]);
+        return error;
+    }
+    int partner = panel->round ? partner_of(fl, panel, a) : -1;
     for (int o = 0; o < panel->outputs; o++) {
         if (o % na != a && o % na != partner) continue;
         double moved = 0.0;

@@ -84,12 +84,8 @@ static void swing(const Flow *fl, const Panel *panel, double *columns, int count
 {
     const double *e = panel->whole;
     for (int b = 0; b < fl->n; b++, e += 6) {
-        double *restrict first = columns + (size_t)2 * b * count, *restrict second = first + count;
-        for (int c = 0; c < count; c++) {
-            double x = first[c], y = second[c];
-            first[c] = e[0] * x + e[1] * y;
-            second[c] = e[2] * x + e[3] * y;
-        }
+        double *first = columns + (size_t)2 * b * count;
+        move_rows((Square){e[0], e[1], e[2], e[3]}, first, first + count, count);
     }
 }
 

@@ -132,7 +132,8 @@ static bool sways_unseen(const Flow *fl, const Gauss *tab, int kind, double h, c
 /* fill the tails of the responses to the stops and of their squares, each (na,), of a new panel */
 static void fill_response_tails(const Flow *fl, const Gauss *tab, Panel *panel, Scratch *s)
 {
-    for (int a = 0; a < panel->na && !panel->weighed; a++) {
+    if (panel->weighed) return;
+    for (int a = 0; a < panel->na; a++) {
         int stop = panel->active[a];
         const double *back = panel->back + (size_t)a * fl->size * panel->m;
         double tail = larger(response_tail(fl, tab, stop, back, false), fl->tail);

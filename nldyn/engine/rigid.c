@@ -122,11 +122,8 @@ static void leave_parting(const Motion *M, double phase, bool *still)
 /* fill `shift` (n_columns,): change of the instant at which a gap closes */
 static void instant_shift(const Motion *M, int stop, double phase, double t, double *shift)
 {
-    const Flow *fl = M->fl;
-    double speed = output_now(fl, stop, M->w, phase).first;
-    output_columns(fl, stop, 0, phase, t, M->columns, M->n_columns, shift);
-    for (int c = 0; c < fl->n_parameters; c++)
-        if (is_parameter(fl, c, GAP, stop)) shift[fl->size + c] -= 1.0;
+    double speed = output_now(M->fl, stop, M->w, phase).first;
+    depth_columns(M, stop, phase, t, shift);
     for (int c = 0; c < M->n_columns; c++) shift[c] = -shift[c] / speed;
 }
 
@@ -245,7 +242,7 @@ static void loosen_sliders(const Motion *M, double phase, double roundings)
 {
     const Flow *fl = M->fl;
     for (int s = 0; s < fl->n_stops; s++) {
-        if (!(M->closed[s] && is_slider(fl, s) && is_held(fl, s))) continue;
+        if (!is_stuck(M, s)) continue;
         double speed = output_now(fl, s, M->w, phase).first - stop_of(fl, s)->belt;
         double most = roundings * (rate_noise(fl, s, M->w) + SUM_ROUNDING * fabs(stop_of(fl, s)->belt));
         if (fabs(speed) <= most) continue;
@@ -257,7 +254,7 @@ static void loosen_sliders(const Motion *M, double phase, double roundings)
 static bool any_sticks(const Motion *M)
 {
     for (int s = 0; s < M->fl->n_stops; s++)
-        if (M->closed[s] && is_slider(M->fl, s) && is_held(M->fl, s)) return true;
+        if (is_stuck(M, s)) return true;
     return false;
 }
 
@@ -272,7 +269,7 @@ static void slip_overloaded(const Motion *M, double phase)
         contact_forces(M, phase);
         const double *forces = M->s->stop_forces;
         for (int s = 0; s < fl->n_stops; s++) {
-            if (!(M->closed[s] && is_slider(fl, s) && is_held(fl, s))) continue;
+            if (!is_stuck(M, s)) continue;
             double normal = is_pressed(fl, s) ? forces[(int)stop_of(fl, s)->normal]
                                               : stop_of(fl, s)->pressing;
             double load = fabs(forces[s]) / (grip(fl, s) * larger(normal, 0.0));

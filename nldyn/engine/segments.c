@@ -13,9 +13,7 @@ static void jump_columns(Motion *M, int stop, double phase, double t, bool close
 {
     const Flow *fl = M->fl;
     double *depth = M->s->moved, dashpot = stop_of(fl, stop)->dashpot;
-    output_columns(fl, stop, 0, phase, t, M->columns, M->n_columns, depth);
-    for (int c = 0; c < fl->n_parameters; c++)
-        if (is_parameter(fl, c, GAP, stop)) depth[fl->size + c] -= 1.0;
+    depth_columns(M, stop, phase, t, depth);
     double impulse = closes ? -dashpot : dashpot;
     for (int s = stop; s < fl->n_stops; s++) {
         bool slides = is_pressed(fl, s) && (int)stop_of(fl, s)->normal == stop;

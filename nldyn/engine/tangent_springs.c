@@ -100,9 +100,11 @@ static void add_pressing_columns(const Motion *M, int s, double factor, double p
 {
     const Flow *fl = M->fl;
     int stop = (int)stop_of(fl, s)->normal;
-    for (int c = 0; c < fl->n_parameters && !is_pressed(fl, s); c++)
-        if (is_parameter(fl, c, PRESSING, s)) sums[fl->size + c] += factor;
-    if (!is_pressed(fl, s)) return;
+    if (!is_pressed(fl, s)) {
+        for (int c = 0; c < fl->n_parameters; c++)
+            if (is_parameter(fl, c, PRESSING, s)) sums[fl->size + c] += factor;
+        return;
+    }
     double *depth = M->s->moved, slope = pressing_now(fl, s, M->w, phase).slope;
     Course at = depth_now(fl, stop, M->w, phase);
     output_columns(fl, stop, 0, phase, t, M->columns, M->n_columns, depth);
@@ -151,9 +153,9 @@ static void drag_places(Motion *M, double phase, double t)
 }
 
 /* Let the sliders behind springs slide whose friction is reached and that move on, and the others
- * stick, but for one of which that is known, or what such a stop presses on; what is strained beyond its friction, as at the start
- * of a guess, is let go so far. A speed of so many `roundings`, or gained in the time `allowed`, is
- * none. */
+ * stick, but for one of which that is known, or what such a stop presses on; what is strained
+ * beyond its friction, as at the start of a guess, is let go so far. A speed of so many
+ * `roundings`, or gained in the time `allowed`, is none. */
 static void load_springs(Motion *M, double phase, double t, double roundings, double allowed,
                          int known)
 {
@@ -190,9 +192,7 @@ static void press_on(Motion *M, int stop, double phase, double t)
         bool slides = stop_of(fl, s)->tangential * fabs(speed) > grip(fl, s) * growth;
         fl->slides[s] = !slides && !slides_freely(fl, s) ? 0 : speed > 0.0 ? 1 : -1;
         if (!M->with_columns || fl->slides[s] != 0) continue;
-        output_columns(fl, stop, 0, phase, t, M->columns, M->n_columns, shift);
-        for (int c = 0; c < fl->n_parameters; c++)
-            if (is_parameter(fl, c, GAP, stop)) shift[fl->size + c] -= 1.0;
+        depth_columns(M, stop, phase, t, shift);
         double rate = -speed / strain_by_place(fl, s);
         double *row = M->columns + (size_t)place_entry(fl, s) * M->n_columns;
         for (int c = 0; c < M->n_columns; c++) row[c] -= rate * shift[c] / pace;
