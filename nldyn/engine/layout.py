@@ -189,5 +189,5 @@ class Record:
 def empty_record(capacity: int, size: int, n_stops: int, nodes: int) -> Record:
     """A record with room for so many pieces."""
     block = np.empty((1 + capacity, FIRST_STATE + size + 2 * n_stops * nodes))
-    block[0, 0] = 0.0
+    block[0] = 0.0
     return Record(block, size, n_stops)

@@ -106,6 +106,7 @@ static void pass_event(Motion *M, int event, double h)
         if (M->closed[event]) M->closings[event]++;
     }
     switch_with(M, here, M->t, h);
+    if (!any_sprung(M->fl)) return;
     contact_forces(M, here);
     load_springs(M, here, M->t, SHUT, 10.0 * coarsest_instant(M->fl) * h, event);
 }

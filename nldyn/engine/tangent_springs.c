@@ -91,6 +91,13 @@ static bool at_grip(const Flow *fl, int s, const double *w, double phase, double
     return margin <= allowed * pace + 10.0 * strain_noise(fl, s, w);
 }
 
+static bool any_sprung(const Flow *fl)
+{
+    for (int s = 0; s < fl->n_stops; s++)
+        if (is_sprung(fl, s)) return true;
+    return false;
+}
+
 /* whether a slider has no friction, so that nothing tells which way it slides */
 static bool slides_freely(const Flow *fl, int s) { return is_sprung(fl, s) && grip(fl, s) == 0.0; }
 
@@ -155,7 +162,7 @@ static void drag_places(Motion *M, double phase, double t)
 /* Let the sliders behind springs slide whose friction is reached and that move on, and the others
  * stick, but for one of which that is known, or what such a stop presses on; what is strained
  * beyond its friction, as at the start of a guess, is let go so far. A speed of so many
- * `roundings`, or gained in the time `allowed`, is none. */
+ * `roundings`, or gained in the time `allowed` by s->pushes, is none. */
 static void load_springs(Motion *M, double phase, double t, double roundings, double allowed,
                          int known)
 {
@@ -171,7 +178,8 @@ static void load_springs(Motion *M, double phase, double t, double roundings, do
         if (fabs(force) > most + noise) drag_place(M, s, way, phase, t);
         if (smaller(most, fabs(force)) <= noise) way = strain.first > 0.0 ? 1 : -1;
         double speed = way * drag_speed(fl, s, way, M->w, phase);
-        double none = roundings * drag_noise(fl, s, M->w, phase) + allowed * fabs(M->s->pushes[s]);
+        double none = roundings * drag_noise(fl, s, M->w, phase);
+        if (allowed > 0.0) none += allowed * fabs(M->s->pushes[s]); /* else these are not filled */
         bool slides = (before != 0 || at_grip(fl, s, M->w, phase, allowed)) && speed > none;
         fl->slides[s] = slides || slides_freely(fl, s) ? way : 0;
         if (fl->slides[s] != before) M->panel->na = -1; /* its equations are others now */
