@@ -128,9 +128,13 @@ class Body:
         return np.concatenate([y[n : 2 * n], accelerations, places])
 
     def strain(self, i: int, y: Vector) -> float:
-        n, contact = len(self.mass), self.contacts[i]
+        contact = self.contacts[i]
+        return float(contact.tangent @ y[: len(self.mass)]) - float(y[self.place_entry(i)])
+
+    def place_entry(self, i: int) -> int:
+        """Where in the state the place of what slides behind the spring of a contact is."""
         before = sum(other.spring is not None for other in self.contacts[:i])
-        return float(contact.tangent @ y[:n]) - float(y[2 * n + before])
+        return 2 * len(self.mass) + before
 
     def pull(self, i: int, y: Vector) -> float:
         return float(self.contacts[i].spring or 0.0) * self.strain(i, y)
@@ -232,9 +236,9 @@ class Body:
         for j, contact in enumerate(self.contacts):
             if contact.spring is None or self.modes[j] == 0.0:
                 continue
-            n, before = len(self.mass), sum(c.spring is not None for c in self.contacts[:j])
             pull = 0.0 if np.isnan(self.modes[j]) else self.modes[j] * self.grip(j, y)
-            y[2 * n + before] = float(contact.tangent @ y[:n]) - pull / contact.spring
+            free = float(contact.tangent @ y[: len(self.mass)])
+            y[self.place_entry(j)] = free - pull / contact.spring
         return y
 
     def closing_mode(self, i: int, y: Vector) -> float:

@@ -51,7 +51,7 @@ def corner_ahead(here: BranchNode, grazing_step: float, max_step: float) -> list
             found = correct(family, here.point, Both(here.condition, grazing), max_iterations=25)
         if found is None or not found.converged:
             return []
-        weights = family.metric(here.point)
+        weights = here.weights
         way = found.at.point - here.point
         length = metric_length(weights, way)
         ahead = float(way @ (weights * here.tangent)) > STRAIGHT_AHEAD * length
@@ -69,7 +69,7 @@ def corner_ahead(here: BranchNode, grazing_step: float, max_step: float) -> list
             behind = _behind(corner, grazing, side, 2.0 * max_step)
             if behind is not None:
                 chord = behind.point - corner.point
-                tangent = chord / metric_length(family.metric(corner.point), chord)
+                tangent = chord / metric_length(corner.weights, chord)
                 return [replace(corner, tangent=tangent), behind]
         tangent = _tangent_behind(found.at, here.condition, grazing, before < 0.0)
         return [replace(corner, tangent=tangent)]
@@ -146,9 +146,9 @@ def extremes_meet(here: BranchNode, within: float = MEETS) -> bool:
     grazing = here.condition
     if not isinstance(grazing, Grazing):
         return False
-    found, full = here.orbit.touched, 2.0 * math.pi * here.orbit.period
-    other = nearest(found, 2 * grazing.stop + (not grazing.is_maximum), grazing.phase, full)
-    return other >= 0 and abs(float(found[other, 1])) < within * grazing.unit
+    orbit, full = here.orbit, 2.0 * math.pi * here.orbit.period
+    other = nearest(orbit.touched, grazing.stop, not grazing.is_maximum, grazing.phase, full)
+    return other is not None and abs(float(other[1])) < within * grazing.unit
 
 
 def grazes_linear(orbit: Orbit) -> bool:

@@ -108,7 +108,7 @@ def _met_at_touch(name: str, chord: Chord, touch: Touch) -> tuple[float, Special
     grazing = Grazing(touch.output, touch.is_maximum, touch.phase, length_unit(a.orbit))
     both = Both(a.condition, grazing)
     found = correct(family, guess, both, max_iterations=25)
-    weights, way = family.metric(a.point), b.point - a.point
+    weights, way = a.weights, b.point - a.point
     sigma = float((found.at.point - a.point) @ (weights * way) / (way @ (weights * way)))
     if not (found.converged and 0.0 <= sigma <= 1.0):
         return None

@@ -68,8 +68,7 @@ def _on_chart_plane(a: BranchNode, b: BranchNode, which: int, value: float) -> B
 
 def clear_of_nodes(a: BranchNode, b: BranchNode) -> tuple[BranchNode, BranchNode]:
     """Two neighbours, by their states at other phases where an impact passes one between them."""
-    family = a.family
-    apart = metric_length(family.metric(a.point), b.point - a.point)
+    apart = metric_length(a.weights, b.point - a.point)
     smooth = apart < MOST_BENT * abs(b.arclength - a.arclength)
     if smooth or nodes_to_impacts(a.orbit) > FARTHEST_NODE:
         return a, b
@@ -98,9 +97,7 @@ def passages(points: Iterable[BranchNode], which: int, value: float) -> Iterator
             there = on_plane(a, way, share * span, which, target)
             if there is None:
                 continue
-            away = [
-                metric_length(family.metric(a.point), there.point - other.point) for other in met
-            ]
+            away = [metric_length(a.weights, there.point - other.point) for other in met]
             if min(away, default=math.inf) > AT_POINT * span:
                 met.append(there)
                 yield there

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from nldyn.base.arrays import Complex
 from nldyn.bifurcations.kinds import KINDS
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.orbits.critical_functions import ROUNDED_MODULUS, number_outside
@@ -51,8 +50,7 @@ def accounted(a: Orbit, found: list[SpecialPoint], b: Orbit) -> bool:
 
     At each of them the other multipliers tell the number outside on either side.
     """
-    fewest, most = a.critical.outside
-    outside = set(range(fewest, most + 1))
+    outside = _from_to(a.critical.outside)
     for special in found:
         if special.kind == "GR":
             continue
@@ -63,15 +61,14 @@ def accounted(a: Orbit, found: list[SpecialPoint], b: Orbit) -> bool:
         else:
             crossing = np.argsort(np.abs(mu - KINDS[special.kind].multiplier))[:1]
         size = crossing.size
-        others = _possible_outside(np.delete(mu, crossing))
+        others = _from_to(number_outside(np.delete(mu, crossing), ROUNDED_MODULUS))
         outside = {n + size for n in others & outside} | {n for n in others if n + size in outside}
-    fewest, most = b.critical.outside
-    return bool(outside & set(range(fewest, most + 1)))
+    return bool(outside & _from_to(b.critical.outside))
 
 
-def _possible_outside(multipliers: Complex) -> set[int]:
-    """Numbers of multipliers that may lie outside the unit circle, given their rounding."""
-    fewest, most = number_outside(multipliers, ROUNDED_MODULUS)
+def _from_to(bounds: tuple[int, int]) -> set[int]:
+    """Whole numbers from the fewest to the most."""
+    fewest, most = bounds
     return set(range(fewest, most + 1))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import LocateError
 from nldyn.bifurcations.point import BranchNode
+from nldyn.engine.sample import of_stop
 from nldyn.orbits.bordered import length_unit
 from nldyn.orbits.extremes import alone, nearest, sign_changes
 from nldyn.orbits.orbit import Extremes, Orbit
@@ -30,11 +31,11 @@ class Touch:
 
     def depth(self, point: BranchNode) -> float:
         """Value of the extremum of this kind nearest in phase."""
-        found, full = point.orbit.touched, 2.0 * math.pi * point.orbit.period
-        index = nearest(found, 2 * self.output + self.is_maximum, self.phase, full)
-        if index < 0:
+        orbit, full = point.orbit, 2.0 * math.pi * point.orbit.period
+        found = nearest(orbit.touched, self.output, self.is_maximum, self.phase, full)
+        if found is None:
             raise LocateError("an extreme has vanished")
-        return float(found[index, 1])
+        return float(found[1])
 
 
 @lru_cache(maxsize=4)  # of a step it is asked for by all that look into it
@@ -58,7 +59,7 @@ def changes_hidden_by_birth(a: Orbit, b: Orbit) -> bool:
         if count == other:
             continue
         fewer, more = (a, b) if count < other else (b, a)
-        first, last = (orbit.touched[orbit.touched[:, 2] // 2 == output] for orbit in (fewer, more))
+        first, last = (of_stop(orbit.touched, output) for orbit in (fewer, more))
         new = last[alone(first, last, 2.0 * math.pi * a.period)]
         if np.any(new[:, 1] * fewer.penetration(output, new[:, 0]) < 0.0):
             return True

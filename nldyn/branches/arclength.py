@@ -445,7 +445,7 @@ class Stepper:
         They would do so for ever on the scale of their own size. It is rest, but where no orbit of
         a curve is found there; None if they do not.
         """
-        family, charts, n = here.family, here.family.charts, here.family.n_states
+        charts, n = here.family.charts, here.family.n_states
         at_zero = [
             place
             for place, (chart, limits) in enumerate(zip(charts, self._ranges, strict=True))
@@ -457,12 +457,12 @@ class Stepper:
         scaled = np.arange(here.point.size) < n
         scaled[[n + place for place in at_zero]] = True
         secant = here.point - behind[0]
-        secant /= metric_length(family.metric(here.point), secant)
+        secant /= metric_length(here.weights, secant)
         held = float(np.abs(secant[~scaled]).max(initial=0.0))
         if held > SCALES or not scales(here.point[scaled], secant[scaled]):
             return None
         way = np.where(scaled, -here.point, 0.0)
-        length = metric_length(family.metric(here.point), way)
+        length = metric_length(here.weights, way)
         rest = on_plane(here, way, length, at_zero[-1], 0.0)
         if rest is None and here.condition is FREE:
             return None
@@ -606,7 +606,7 @@ def _resonance_beside(orbit: Orbit) -> float | None:
 
 def _rounding(here: BranchNode) -> float:
     """How far rounding moves an orbit, over its size: ε by the condition of what closes it."""
-    weights = np.sqrt(here.family.metric(here.point))
+    weights = np.sqrt(here.weights)
     of_states = weights[: here.family.n_states, None]
     try:
         closing = here.family.at(here.point).jacobian

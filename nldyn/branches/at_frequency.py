@@ -221,7 +221,7 @@ def _held(chord: Chord, sigma: float, guess: Real, p: float) -> BranchNode:
     if not found.converged:
         raise LocateError(found.failure)
     secant = b.point - a.point
-    weights = a.family.metric(a.point)
+    weights = a.weights
     off = found.point - start
     if float(off @ (weights * off)) > LEFT * float(secant @ (weights * secant)):
         raise LocateError("Newton's method left the branch")

@@ -150,7 +150,7 @@ def jumped(attempt: Attempt) -> str:
 def mends(attempt: Attempt) -> str:
     """A broken symmetry is whole again; along a curve rounding may break it."""
     here, there = attempt.here, attempt.there
-    mended = attempt.free and mends_symmetry(here.family, here.asymmetry, there.asymmetry)
+    mended = mends_symmetry(here.family, here.asymmetry, there.asymmetry)
     return _told("the next orbit is a symmetric one", mended)
 
 
@@ -229,7 +229,7 @@ def meets_flip(attempt: Attempt) -> str:
 
 def crosses_branch(attempt: Attempt) -> str:
     """Another branch is crossed in a long step, or the orbit is one of another branch."""
-    if not attempt.free or passed_flip(attempt.here, attempt.found):
+    if passed_flip(attempt.here, attempt.found):
         return ""
     if not crosses(attempt.here, attempt.there):
         return ""
@@ -240,7 +240,7 @@ def crosses_branch(attempt: Attempt) -> str:
 def ends_on_crossing(attempt: Attempt) -> str:
     """Another branch crosses where the step ends."""
     within = min(NEAR_CROSSING * attempt.step, ON_CROSSING)
-    on = attempt.free and lies_on_crossing(attempt.found, within)
+    on = lies_on_crossing(attempt.found, within)
     return _told("another branch crosses at the next point", on)
 
 

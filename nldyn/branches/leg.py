@@ -478,7 +478,7 @@ def _detour(
     if inner.stop_reason.ending is not Ending.MEETS_OPEN_END or not between:
         return None
     last = between[-1]
-    ahead = float((b.point - last.point) @ (last.family.metric(last.point) * b.tangent))
+    ahead = float((b.point - last.point) @ (last.weights * b.tangent))
     return between if ahead > 0.0 else None
 
 

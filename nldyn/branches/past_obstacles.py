@@ -171,7 +171,7 @@ def across_touch(here: BranchNode, step: float, row: Real) -> Advance | None:
     way, and where it is held the stop's force hardly depends on the orbit.
     """
     family = here.family
-    weights = family.metric(here.point)
+    weights = here.weights
     guess = here.point + step * here.tangent / metric_length(weights, here.tangent)
     found = correct(family, guess, FREE, row, longest=2.0 * KINK, max_iterations=FROM_NEAR)
     after = asymmetry(family.problem, found.point)
@@ -197,7 +197,7 @@ def crossing_ahead(here: BranchNode) -> BranchNode | None:
     if crossing is None:
         return None
     way = crossing.point - here.point
-    weights = here.family.metric(here.point)
+    weights = here.weights
     if metric_length(weights, way) > FARTHEST_CROSSING:
         return None
     ahead = float(way @ (weights * here.tangent)) / metric_length(weights, here.tangent)

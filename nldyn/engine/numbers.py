@@ -31,8 +31,3 @@ def reals(values: ArrayLike) -> Real:
 def complexes(values: ArrayLike) -> Complex:
     """Complex numbers, row by row."""
     return np.ascontiguousarray(values, dtype=np.complex128)
-
-
-def flags(values: ArrayLike) -> NDArray[np.bool_]:
-    """Truth values, a byte each."""
-    return np.ascontiguousarray(values, dtype=np.bool_)

@@ -95,6 +95,12 @@ def touches(
     return found, shallow.tolist()
 
 
+def of_stop(extremes: Real, stop: int) -> Real:
+    """Those of the extremes (k, 4) of `touches` that are one stop's."""
+    found: Real = extremes[extremes[:, 2] // 2.0 == stop]
+    return found
+
+
 def _filled(fill: Callable[[int, int], int]) -> Real:
     """Extremes that a function fills: it is told the room and the address, and tells how many."""
     room = 64

@@ -47,7 +47,7 @@ from nldyn.engine.layout import (
 )
 from nldyn.engine.library import Packed
 from nldyn.engine.newton import Corrector, Found, newton, packed_system
-from nldyn.engine.sample import local_extremes, sample_states, touches
+from nldyn.engine.sample import local_extremes, of_stop, sample_states, touches
 from nldyn.flow.gauss import GaussTables, gauss_tables
 from nldyn.flow.options import FlowOptions, PanelBounds, _floats, _nodes_for_switch
 from nldyn.flow.packing import (
@@ -879,8 +879,7 @@ class Trajectory:
         first = flow.first_alike[output]
         if first not in self._extremes:
             if first < len(flow.system.stops):
-                found = self.recorded_touches[0]
-                found = found[found[:, 2] // 2.0 == first]
+                found = of_stop(self.recorded_touches[0], first)
             else:
                 ride = flow.ride(first, self.omega)
                 found = local_extremes(

@@ -340,11 +340,11 @@ class Grazing:
 
     def extreme(self, orbit: Orbit) -> tuple[float, float]:
         """Phase and depth of the extreme."""
-        found, full = orbit.touched, 2.0 * math.pi * orbit.period
-        index = nearest(found, 2 * self.stop + self.is_maximum, self.phase, full)
-        if index < 0:
+        full = 2.0 * math.pi * orbit.period
+        found = nearest(orbit.touched, self.stop, self.is_maximum, self.phase, full)
+        if found is None:
             raise ConvergenceError("an extreme has vanished")
-        phase = float(found[index, 0])
+        phase = float(found[0])
         return phase, exact_output(orbit, self.stop, phase) - orbit.system.stops[self.stop].gap
 
     def slope(self, place: Place, phase: float) -> Real:

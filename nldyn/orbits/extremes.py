@@ -26,9 +26,11 @@ _dips = function(
 _COUNTS = struct.Struct("3q")
 
 
-def nearest(extremes: Real, key: int, phase: float, full: float) -> int:
-    """Index of the extreme (k, 4) of a key nearest in phase on a circle of length `full`, or -1."""
-    return int(_nearest(len(extremes), address_of(extremes), key, phase, full))
+def nearest(extremes: Real, stop: int, is_maximum: bool, phase: float, full: float) -> Real | None:
+    """The extreme (4,) of a stop nearest in phase on a circle of length `full`, or None."""
+    key = 2 * stop + is_maximum
+    index = _nearest(len(extremes), address_of(extremes), key, phase, full)
+    return extremes[index] if index >= 0 else None
 
 
 def sign_changes(before: Real, after: Real, stops: int, full: float) -> list[list[float]]:

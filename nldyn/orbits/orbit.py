@@ -13,6 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from nldyn.base.arrays import SLACK, Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_types, check_whole, numbers
+from nldyn.engine.sample import of_stop
 from nldyn.flow.flow_map import SHALLOW, FlowError, FlowMap, Solution, Trajectory, chain
 from nldyn.flow.rigid import (
     impacts_in_order,
@@ -353,7 +354,7 @@ class Orbit:
         The others have an error of 1e-6 of the deepest, and need no further flow.
         """
         if stop not in self._touches:
-            phases, values, keys, _ = self.touched[self.touched[:, 2] // 2.0 == stop].T
+            phases, values, keys, _ = of_stop(self.touched, stop).T
             self._touches[stop] = Extremes(phases, values, keys % 2.0 > 0.0)
         return self._touches[stop]
 
@@ -365,20 +366,20 @@ class Orbit:
             return found
         parts = [np.empty((0, 4))]
         for number, stop in enumerate(self.system.stops):
-            of_stop = found[found[:, 2] // 2.0 == number]
+            own = of_stop(found, number)
             if shallow[number]:
-                depths = np.abs(of_stop[:, 1])
+                depths = np.abs(own[:, 1])
                 near = depths <= SHALLOW * depths.max()
-                places, values = self.trajectory.exact_values(of_stop, number, near)
-                of_stop[places, 1] = values - stop.gap
-            parts.append(self._off_rigid_stop(of_stop, number) if stop.impulsive else of_stop)
+                places, values = self.trajectory.exact_values(own, number, near)
+                own[places, 1] = values - stop.gap
+            parts.append(self._off_rigid_stop(own, number) if stop.impulsive else own)
         return np.concatenate(parts)
 
     @cached_property
     def touch_counts(self) -> tuple[int, ...]:
         """How many extremes each stop's penetration has."""
-        of_stop = (self.touched[:, 2] // 2.0).tolist()
-        return tuple(of_stop.count(stop) for stop in range(len(self.system.stops)))
+        numbers = (self.touched[:, 2] // 2.0).tolist()
+        return tuple(numbers.count(stop) for stop in range(len(self.system.stops)))
 
     @cached_property
     def _extremes(self) -> dict[int, Extremes]:
