@@ -1,6 +1,8 @@
 /* When stops open and close, and sliders slide and stick. */
 #include "engine.h"
 
+#define GROWTH 0.5 /* of a slip in a panel, the logarithm of it, at most */
+#define HIDDEN_GROWTH 3e-9 /* of a panel: in a time so short rounding hides how a slip grows */
 #define PRESSING_ROUNDING 1e-14 /* of its terms: the acceleration against which a rigid stop presses */
 
 /* The output that tells when a stop opens or closes, by passing its gap: the penetration or, of
@@ -183,13 +185,21 @@ static int stop_at_switch(const Flow *fl, const double *w, double phase, double 
  * A law with a power that is not whole is singular at its switch; at a distance τ from it, 4 τ is
  * a length on which Legendre coefficients fall by 2.6 from one to the next (Bernstein's ellipse).
  * Where a map has its nodes crowded there (switched), a switch within the error allowed in its
- * instant does not count. */
+ * instant does not count. Where friction falls with the speed, a slip grows: a panel that skips
+ * its growth would solve the equations, too. */
 static double graded_length(const Flow *fl, const Panel *panel, const double *w, double phase,
                             double h, double sign, bool switched, int event)
 {
     double longest = INFINITY;
     for (int a = 0; a < panel->na; a++) {
         int s = panel->active[a];
+        if (is_slider(fl, s) && !is_held(fl, s)) {
+            double speed = output_now(fl, s, w, phase).first;
+            double normal = pressing_now(fl, s, w, phase).value;
+            double growth = -stop_of(fl, s)->mobility * sliding_law(fl, s, speed, normal).viscosity;
+            bool hidden = GROWTH < growth * HIDDEN_GROWTH * h;
+            if (growth > 0.0 && !hidden) longest = smaller(longest, GROWTH / growth);
+        }
         if (s == event || !singular_slope(fl, s)) continue;
         Course at = depth_now(fl, s, w, phase);
         double delta = at.value, speed = at.first, accel = at.second, away;

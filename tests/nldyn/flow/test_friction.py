@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from sliding import Body, Contact, Wall
 
 from nldyn import (
@@ -227,6 +228,22 @@ def test_a_block_on_friction_rests_against_a_wall_and_is_let_go():
     # the wall alone holds it: what pulls, less the spring
     pull = 2.0 + 3.0 * np.cos(orbit.omega * history.time) - 0.5
     np.testing.assert_allclose(history.force[resting, 0], pull[resting], atol=1e-9)
+
+
+@pytest.mark.parametrize("fading", [1e-3, 1e-4, 1e-5])
+def test_a_slip_grows_as_fast_as_its_friction_falls(fading):
+    law = Friction(0.3, 0.4, fading, base_speed=0.1)
+
+    def rate(_, y):  # of displacement and slip behind the belt
+        return [law.base_speed - y[1], y[0] - float(law.at(y[1]))]
+
+    found = solve_ivp(rate, (0.0, 1.0), [0.4, 0.0], "DOP853", rtol=1e-13, atol=1e-17)
+    belt = [DryFriction("x", 1.0, law)]
+    flow = FlowMap(System.from_matrices([[1.0]], [[1.0]], {"x": [1.0]}, dampers=belt))
+    begin = flow.to_state(np.array([0.4 - 0.1 * law.base_speed, law.base_speed]))
+    end = flow.to_modal(flow.shoot(begin[None], np.array([0.0, 1.1]), 1.0).ends[0])
+    off = end - [found.y[0, -1], law.base_speed - found.y[1, -1]]
+    assert np.abs(off).max() < 1e-9
 
 
 def test_friction_of_zero_changes_nothing():
