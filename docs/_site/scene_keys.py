@@ -16,12 +16,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from nldyn.scene import schema
+from nldyn.scene.schema.scene import Scene
+from nldyn.scene.schema.table import Table
 
 PAGE = Path(__file__).resolve().parents[1] / "reference" / "scene.md"
 HEAD = "| key | type | unit | default | meaning |\n|---|---|---|---|---|\n"
 TABLE = re.compile(r"^\| key \|.*\n(?:\|.*\n)+", flags=re.M)
-NAME = re.compile(r"`\[+([\w.]+)\]+`(?:`? with `+law = \"(\w+)\")?")
+NAME = re.compile(r"`\[+([\w.]+)\]+`+( (?:at|of|with) [^:.\n]+)?")
 KINDS = {"string": "text", "number": "number", "integer": "whole number", "boolean": "true, false"}
 BOUNDS = (
     ("above", ("exclusiveMinimum", "gt")),
@@ -31,21 +32,21 @@ BOUNDS = (
 )
 
 
-def tables() -> dict[str, type[schema.Table]]:
+def tables() -> dict[str, type[Table]]:
     """The tables of a scene by the names that their docstrings begin with; "" is its top.
 
-    Those of one law have it behind the name.
+    Where there are several tables of one name, what tells them apart is behind the name.
 
     Examples
     --------
     >>> tables()["stops"].__name__
     'StopTable'
     """
-    named = {name_of(table.__doc__ or ""): table for table in subclasses(schema.Table)}
-    return {**named, "": schema.Scene}
+    named = {name_of(table.__doc__ or ""): table for table in subclasses(Table)}
+    return {**named, "": Scene}
 
 
-def subclasses(table: type[schema.Table]) -> Iterator[type[schema.Table]]:
+def subclasses(table: type[Table]) -> Iterator[type[Table]]:
     """All classes made of one."""
     for each in table.__subclasses__():
         yield each
@@ -53,38 +54,38 @@ def subclasses(table: type[schema.Table]) -> Iterator[type[schema.Table]]:
 
 
 def name_of(text: str) -> str:
-    """The name of the table that a text tells first, and the law, if it tells one."""
+    """The name of the table that a text tells first, and which of several, if it tells that."""
     found = NAME.search(text)
-    return " ".join(filter(None, found.groups())) if found else ""
+    return "".join(filter(None, found.groups())).replace("`", "") if found else ""
 
 
 @cache
-def meanings() -> dict[str, dict[str, str]]:
-    """What stands below each key in the schema, by the names of classes and keys."""
-    classes = [c for c in ast.parse(inspect.getsource(schema)).body if isinstance(c, ast.ClassDef)]
+def meanings(table: type[Table]) -> dict[str, str]:
+    """What stands below each key of a class of the schema."""
+    (found,) = ast.parse(inspect.getsource(table)).body
+    assert isinstance(found, ast.ClassDef)
     return {
-        table.name: {
-            key.target.id: " ".join(below.value.value.split())
-            for key, below in pairwise(table.body)
-            if isinstance(key, ast.AnnAssign)
-            and isinstance(key.target, ast.Name)
-            and isinstance(below, ast.Expr)
-            and isinstance(below.value, ast.Constant)
-            and isinstance(below.value.value, str)
-        }
-        for table in classes
+        key.target.id: " ".join(below.value.value.split())
+        for key, below in pairwise(found.body)
+        if isinstance(key, ast.AnnAssign)
+        and isinstance(key.target, ast.Name)
+        and isinstance(below, ast.Expr)
+        and isinstance(below.value, ast.Constant)
+        and isinstance(below.value.value, str)
     }
 
 
-def keys_table(table: type[schema.Table]) -> str:
+def keys_table(table: type[Table]) -> str:
     """Keys of a table with type, unit, default and meaning, as Markdown."""
     told = table.model_json_schema()
     required = told.get("required", ())
-    own = [table, *(base for base in table.__mro__[1:] if not name_of(base.__doc__ or ""))]
+    bases = [base for base in table.__mro__[1:] if issubclass(base, Table)]
+    above = {key for base in bases if name_of(base.__doc__ or "") for key in base.model_fields}
+    rows = {key: text for each in reversed([table, *bases]) for key, text in meanings(each).items()}
     return HEAD + "".join(
         row(name, told["properties"][name], name in required, meaning)
-        for each in reversed(own)
-        for name, meaning in meanings().get(each.__name__, {}).items()
+        for name, meaning in rows.items()
+        if name not in above
     )
 
 

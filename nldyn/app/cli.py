@@ -49,7 +49,7 @@ UNCUT = 10_000  # letters of a summary
 if TYPE_CHECKING:
     from nldyn.longterm.basins import PlaneState
     from nldyn.scene.build import Structure
-    from nldyn.scene.schema import Scene
+    from nldyn.scene.schema.scene import Scene
 
 
 def print_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:

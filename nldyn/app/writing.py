@@ -18,7 +18,7 @@ from nldyn.report.console import kept_at_interrupt, plain_errors
 
 if TYPE_CHECKING:
     from nldyn.runtime.progress import ProgressLine
-    from nldyn.scene.schema import Scene
+    from nldyn.scene.schema.scene import Scene
 
 Found = TypeVar("Found")
 

@@ -27,7 +27,7 @@ from nldyn.runtime.result_directory import SCENE, OutputError, result_directory
 from nldyn.runtime.unfinished import unfinished_path
 from nldyn.scene.build import AnyComponent, Structure, build_structure, build_system
 from nldyn.scene.read import load_scene
-from nldyn.scene.schema import Scene
+from nldyn.scene.schema.scene import Scene
 from nldyn.search.diagram import Diagram
 from nldyn.search.exploration import Exploration
 from nldyn.system.system import same_system

@@ -13,7 +13,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SceneError
 from nldyn.report.modes import mode_table
 from nldyn.scene.build import Structure
-from nldyn.scene.schema import Scene
+from nldyn.scene.schema.scene import Scene
 
 NEIGHBOURS = 12
 ONE_FREQUENCY = 1e-3  # relative; on meshes without symmetry double modes lie apart

@@ -13,7 +13,7 @@ import cms
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SceneError
 from nldyn.scene.build import Structure, build_structure, build_system
-from nldyn.scene.schema import Scene
+from nldyn.scene.schema.scene import Scene
 
 AXES = ("x", "y", "z")
 ROUNDING = 1e-12  # of the whole mass

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from fem.render.pictures import AnyComponent
     from nldyn.bifurcations.point import SpecialPoint
     from nldyn.orbits.orbit import Orbit
-    from nldyn.scene.schema import Scene
+    from nldyn.scene.schema.scene import Scene
 
 MOST_POINTS = 10_000  # of all branches together that are drawn and listed
 NO_STOPS: dict[str, Any] = {"names": [], "turn": []}

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from nldyn.orbits.orbit import Impact, Orbit
     from nldyn.report.comparison import Comparison
     from nldyn.runtime.progress import Progress
-    from nldyn.scene.schema import Scene
+    from nldyn.scene.schema.scene import Scene
     from nldyn.system.system import System
 
 FRAMES = 60

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from nldyn.branches.branch import Branch
     from nldyn.branches.cascades import Cascade
     from nldyn.report.page import Drawn
-    from nldyn.scene.schema import Scene
+    from nldyn.scene.schema.scene import Scene
     from nldyn.search.diagram import Diagram
     from nldyn.search.exploration import Exploration
 

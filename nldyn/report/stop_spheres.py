@@ -5,7 +5,7 @@ from __future__ import annotations
 from fem.render import StopSphere
 from nldyn.scene.build import place
 from nldyn.scene.followed import followed_parameter
-from nldyn.scene.schema import Scene
+from nldyn.scene.schema.scene import Scene
 from nldyn.system.naming import is_angle
 from nldyn.system.parameters import Parameter
 

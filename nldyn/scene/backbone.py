@@ -12,11 +12,14 @@ from nldyn.curves.resonances import phase_resonance, strength_of
 from nldyn.orbits.conditions import driving_source
 from nldyn.scene.build import build_reduced, build_system
 from nldyn.scene.faults import told_as
-from nldyn.scene.schema import DampingTable, Scene, StructureTables
+from nldyn.scene.schema.connections import DampingTable
+from nldyn.scene.schema.scene import Scene
+from nldyn.scene.schema.structures import StructureTables
 from nldyn.system.parameters import strength
 
 Given = TypeVar("Given", bound=StructureTables)
 LONG_STEPS = ContinuationOptions(max_step=0.2)  # along a curve that bends little
+RUBBING = {"friction", "along", "along_against"}  # keys of an area
 BEGIN = 1e-3  # smallest amplitude, relative to the largest
 
 
@@ -36,7 +39,7 @@ def undamped(scene: Scene) -> Scene:
         "dampers": [],
         "friction": [],
         "contact_areas": [
-            table.model_copy(update={"friction": None, "along": None, "along_against": None})
+            table.model_copy(update=dict.fromkeys(RUBBING & type(table).model_fields.keys()))
             for table in scene.contact_areas
         ],
         "round_clearances": [

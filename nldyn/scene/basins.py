@@ -19,7 +19,7 @@ from nldyn.scene.build import build_system
 from nldyn.scene.faults import told_as
 from nldyn.scene.followed import axis_of
 from nldyn.scene.messages import scene_error
-from nldyn.scene.schema import Scene
+from nldyn.scene.schema.scene import Scene
 from nldyn.system.system import System
 
 STARTS = 24  # states from which attractors are looked for

@@ -30,7 +30,7 @@ from nldyn.scene.faults import told_as, within_component
 from nldyn.scene.load_case import load_case_of
 from nldyn.scene.matrices import build_matrices, skew_matrices
 from nldyn.scene.messages import scene_error
-from nldyn.scene.schema import Scene, ends_of
+from nldyn.scene.schema.scene import Scene
 from nldyn.scene.stops_and_loads import acting_elements
 from nldyn.system.loads import BaseMotion
 from nldyn.system.ride import carried_apart, told_apart
@@ -304,7 +304,7 @@ def _tell_of_crossed_joints(scene: Scene) -> None:
     """Warn of joints that make displacements along different axes equal."""
     for joint in scene.joints:
         along = {}
-        for end in joint.ends:
+        for end in joint.joined:
             component, name = place(end)
             interface = scene.components[component].interfaces.get(name)
             if interface is not None:
@@ -438,7 +438,7 @@ def _check_rides(scene: Scene, system: System) -> None:
     tables = ("stops", "friction", "springs", "dampers", "round_clearances")
     for table in tables if bases else ():
         for number, element in enumerate(getattr(scene, table)):
-            for at, against in ends_of(element):
+            for at, against in element.ends:
                 if against is None:
                     continue
                 some, other = (_carried(scene, system, end) for end in (at, against))
@@ -509,7 +509,7 @@ def _relative_system(scene: Scene, reduced: cms.ReducedModel | None) -> System:
 def check_held(scene: Scene, reduced: cms.ReducedModel) -> None:
     """Refuse what nothing holds: rigid-body motions that no spring and no stop feels."""
     rigid = reduced.frequencies_hz == 0.0
-    ends = [end for stop in (*scene.stops, *scene.round_clearances) for end in ends_of(stop)]
+    ends = [end for stop in (*scene.stops, *scene.round_clearances) for end in stop.ends]
     ends += [(stop.at, stop.against) for stop in area_stops(scene)]
     ends += [(spring.at, spring.against) for spring in scene.interface_springs.values()]
     seen = [_stretch(reduced, *pair) for pair in ends]

@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 
 from nldyn.base.errors import SceneError, must_be_symmetric
 from nldyn.scene.messages import KeyPath, joined, scene_error, show, unknown_name
-from nldyn.scene.schema import Matrix, Scene, ends_of
+from nldyn.scene.schema.contacts import ListedAreaTable, MeshAreaTable
+from nldyn.scene.schema.loads import BaseTable
+from nldyn.scene.schema.parts import BeamTable, ShellTable, SolidTable
+from nldyn.scene.schema.scene import Scene
+from nldyn.scene.schema.table import Matrix
 from nldyn.system.system import NOT_HELD, System
 
 SOUND = (10.0, 3e4)  # speeds in m/s, below those of soft rubber and above that of diamond
@@ -108,7 +112,7 @@ def check_computable(scene: Scene, file: Path) -> None:
             fault = "is constant: there is no branch to follow, but 'nldyn simulate' takes it"
         raise scene_error(file, ("excitation",), fault)
     for number, table in enumerate(scene.excitation):
-        if table.frequency_hz is not None:
+        if not table.periodic:
             fault = "leaves no motion a period, so that no branch can be followed: simulate it by "
             wanted = "'nldyn simulate', or let both be multiples 'harmonic' of a lower frequency, "
             rest = "nearly (5 and 7 for a ratio of 1.4)"
@@ -121,7 +125,7 @@ def check_computable(scene: Scene, file: Path) -> None:
 def only_simulated(scene: Scene) -> bool:
     """Whether a scene is meant for ``nldyn simulate``: no range, and loads that have no period."""
     steady = all(table.kind in STEADY for table in scene.excitation)
-    several = any(table.frequency_hz is not None for table in scene.excitation)
+    several = any(not table.periodic for table in scene.excitation)
     begun = bool(scene.excitation) or scene.start is not None
     return scene.continuation is None and begun and (steady or several)
 
@@ -147,7 +151,7 @@ def _unknown_rides(scene: Scene) -> Iterator[str]:
         return
     for table in ("stops", "springs", "dampers", "round_clearances"):
         for number, element in enumerate(getattr(scene, table)):
-            for at, against in ends_of(element):
+            for at, against in element.ends:
                 if against is not None:
                     yield (
                         f"{table}[{number}]: displacements are relative to the base, and modes do "
@@ -291,7 +295,9 @@ def _check_structure(scene: Scene, report: Report) -> None:
         if not getattr(scene, key) and not (key == "parts" and scene.mesh.parts_from_file):
             raise report((key,), "is missing: a mesh needs it")
     for name, part in scene.parts.items():
-        in_space = part.kind == "shell" or (part.kind == "solid" and part.plane is None)
+        in_space = isinstance(part, ShellTable) or (
+            isinstance(part, SolidTable) and part.plane is None
+        )
         if in_space and scene.mesh.model == "frame":
             fault = f"'{part.kind}' needs [mesh] with model = 'structure'"
             raise report(("parts", name, "kind"), fault)
@@ -332,19 +338,19 @@ def _check_joints(scene: Scene, report: Report) -> None:
     known, turning = scene.interface_names, _rotations(scene)
     seen: dict[frozenset[str], int] = {}
     for number, joint in enumerate(scene.joints):
-        for key, end in zip(("at", "against"), joint.ends, strict=False):
+        for key, end in zip(("at", "against"), joint.joined, strict=False):
             component, dot, _ = end.partition(".")
             if dot and component not in scene.components:
                 fault = unknown_name(component, scene.components, "a component")
                 raise report(("joints", number, key), fault)
             if end not in known:
                 raise report(("joints", number, key), unknown_name(end, known, "an interface"))
-        if len({turning[end] for end in joint.ends if end in turning}) > 1:
-            turns = next(end for end in joint.ends if turning[end])
-            other = next(end for end in joint.ends if not turning[end])
+        if len({turning[end] for end in joint.joined if end in turning}) > 1:
+            turns = next(end for end in joint.joined if turning[end])
+            other = next(end for end in joint.joined if not turning[end])
             fault = f"joins '{turns}', a rotation, to '{other}', a displacement"
             raise report(("joints", number), fault)
-        pair = frozenset(joint.ends)
+        pair = frozenset(joint.joined)
         if pair in seen:
             raise report(("joints", number), f"joins what joints[{seen[pair]}] joins already")
         seen[pair] = number
@@ -446,7 +452,7 @@ def _check_interface_names(scene: Scene, report: Report) -> None:
     if faults:
         raise report(*joined(faults))
     for number, table in enumerate(scene.excitation):
-        if table.kind == "base" and table.at in scene.interface_names:
+        if isinstance(table, BaseTable) and table.at in scene.interface_names:
             fault = f"'{table.at}' is an interface, and a base needs a load vector M r of the whole"
             fault += "; a single stop that moves is three loads (docs/how-to/loads.md)"
             raise report(("excitation", number, "at"), fault)
@@ -500,7 +506,7 @@ def _check_absolute(scene: Scene, report: Report) -> None:
 def _check_areas(scene: Scene, report: Report) -> None:
     """Refuse areas of a mesh where there is none, or where the modes are chosen by a tolerance."""
     for number, area in enumerate(scene.contact_areas):
-        if not isinstance(area.at, str):
+        if not isinstance(area, MeshAreaTable):
             continue
         key = ("contact_areas", number, "at")
         if scene.mesh is None:
@@ -541,7 +547,7 @@ def _check_explore(scene: Scene, report: Report) -> None:
 def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
     for table in ("dampers", "stops", "friction", "excitation"):
         for number, entry in enumerate(getattr(scene, table)):
-            if entry.at is not None:
+            if getattr(entry, "at", None) is not None:
                 yield (table, number, "at"), entry.at
     for number, spring in scene.interface_springs.items():
         yield ("springs", number, "at"), spring.at
@@ -550,9 +556,9 @@ def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
             if entry.against is not None:
                 yield (kind, number, "against"), entry.against
     for number, area in enumerate(scene.contact_areas):
-        for key in ("at", "against", "along", "along_against"):
-            named = getattr(area, key)
-            if isinstance(named, list) and isinstance(area.at, list):
+        if isinstance(area, ListedAreaTable):
+            for key in ("at", "against", "along", "along_against"):
+                named = getattr(area, key) or ()
                 yield from ((("contact_areas", number, key), name) for name in named)
     for number, around in enumerate(scene.round_clearances):
         for key, names in (("plane", around.plane), ("against", around.against or ())):
@@ -573,7 +579,8 @@ def _points_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
     for name, interface in scene.interfaces.items():
         yield ("interfaces", name, "at"), interface.at
     for name, part in scene.parts.items():
-        yield from ((("parts", name, "taper"), point) for point in part.taper or ())
+        if isinstance(part, BeamTable):
+            yield from ((("parts", name, "taper"), point) for point in part.taper or ())
     if scene.mesh is not None and scene.mesh.mirror is not None:
         yield ("mesh", "mirror"), scene.mesh.mirror
 

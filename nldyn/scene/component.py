@@ -13,7 +13,9 @@ from nldyn.scene.contact import check_one_mesh, with_areas
 from nldyn.scene.described_parts import told_otherwise, with_described_parts
 from nldyn.scene.faults import check_regular, told_as, unreadable
 from nldyn.scene.messages import KeyPath, scene_error
-from nldyn.scene.schema import PartTable, Scene
+from nldyn.scene.schema.loads import WeightTable
+from nldyn.scene.schema.parts import BeamTable, PartTable, ShellTable, SolidTable, TrussTable
+from nldyn.scene.schema.scene import Scene
 
 AXES = ("x", "y", "z")
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
@@ -72,9 +74,9 @@ def _loaded(scene: Scene, component: fem.Component) -> fem.Component:
     for number, table in enumerate(scene.excitation):
         if table.load is None or table.load in component.interfaces:
             continue
-        acceleration = table.acceleration
-        if acceleration is None:
-            acceleration = [float(table.direction == axis) for axis in AXES]
+        acceleration = [float(table.load == f"base {axis}") for axis in AXES]
+        if isinstance(table, WeightTable):
+            acceleration = table.acceleration
         with told_as(scene, ("excitation", number), fem.ModelError):
             component = component.with_load(table.load, acceleration)
     return component
@@ -127,9 +129,7 @@ def _model(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureModel:
             for m in scene.point_masses
         ],
         springs=[
-            fem.PointSpring(s.at, s.direction, s.stiffness)
-            for s in scene.mesh_springs.values()
-            if s.direction is not None and s.stiffness is not None
+            fem.PointSpring(s.at, s.direction, s.stiffness) for s in scene.mesh_springs.values()
         ],
         hinges=[fem.Hinge(h.at, h.part) for h in scene.hinges],
         couplings=[
@@ -144,41 +144,29 @@ def _model(scene: Scene, mesh: fem.StructureMesh) -> fem.StructureModel:
     )
 
 
-def _truss(table: PartTable) -> fem.TrussPart:
-    if isinstance(table._made, fem.TrussPart):
-        return table._made
-    assert table.area is not None
-    material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
-    return fem.TrussPart(material, table.area)
-
-
 def _part(table: PartTable) -> fem.BeamPart | fem.TrussPart | fem.SolidPart | fem.ShellPart:
-    if isinstance(table._made, fem.SolidPart | fem.ShellPart):
-        return table._made
+    if table._made is not None:
+        made: fem.BeamPart | fem.TrussPart | fem.SolidPart | fem.ShellPart = table._made
+        return made
     material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
-    if table.kind == "solid":
+    if isinstance(table, SolidTable):
         return fem.SolidPart(material, table.plane, table.thickness, table.integration)
-    if table.kind == "shell":
-        assert table.thickness is not None and not isinstance(table.offset, list)
+    if isinstance(table, ShellTable):
         return fem.ShellPart(material, table.thickness, table.offset or 0.0)
-    return _truss(table) if table.kind == "truss" else _beam(table)
-
-
-def _beam(table: PartTable) -> fem.BeamPart:
-    if isinstance(table._made, fem.BeamPart):
-        return table._made
-    material = fem.Material(table.youngs_modulus, table.density, table.poissons_ratio)
+    if isinstance(table, TrussTable):
+        return fem.TrussPart(material, table.area)
+    assert isinstance(table, BeamTable)
     return fem.BeamPart(
         material,
         _section(table),
         table.theory or "euler-bernoulli",
         table.axial_force or 0.0,
         table.orientation,
-        table.offset if isinstance(table.offset, list) else (0.0, 0.0),
+        table.offset or (0.0, 0.0),
     )
 
 
-def _section(table: PartTable) -> fem.CrossSection | fem.TaperedSection:
+def _section(table: BeamTable) -> fem.CrossSection | fem.TaperedSection:
     sections: list[fem.RectangularSection | fem.CircularSection] = []
     for end in ("", "_end"):
         width, height, diameter, bore = (

@@ -13,7 +13,13 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import scene_error
-from nldyn.scene.schema import ContactAreaTable, Scene, exponent_of
+from nldyn.scene.schema.contacts import (
+    ContactAreaTable,
+    ListedAreaTable,
+    MeshAreaTable,
+    exponent_of,
+)
+from nldyn.scene.schema.scene import Scene
 from nldyn.system.contact_area import contact_area, gap_beside
 from nldyn.system.stop import Stop
 
@@ -57,7 +63,7 @@ def with_areas(scene: Scene, component: fem.Component) -> fem.Component:
     found: list[Found] = []
     for number, table in enumerate(scene.contact_areas):
         key = ("contact_areas", number)
-        if not isinstance(table.at, str):
+        if isinstance(table, ListedAreaTable):
             found.append(_listed(table))
             continue
         with told_as(scene, key, fem.ModelError, cms.ReductionError, SystemModelError):
@@ -70,7 +76,7 @@ def with_areas(scene: Scene, component: fem.Component) -> fem.Component:
 
 def check_one_mesh(scene: Scene) -> None:
     """Refuse to take another mesh where points of contact go with that of the scene."""
-    if any(isinstance(table.at, str) for table in scene.contact_areas):
+    if any(isinstance(table, MeshAreaTable) for table in scene.contact_areas):
         fault = "go with the mesh: compare modes or methods, not meshes"
         raise scene_error(scene.file, ("contact_areas",), fault)
 
@@ -80,7 +86,7 @@ def _names(table: ContactAreaTable) -> tuple[str, str]:
     return table.called, f"{table.called} against"
 
 
-def _attached(table: ContactAreaTable, one: Found) -> dict[str, cms.Area]:
+def _attached(table: MeshAreaTable, one: Found) -> dict[str, cms.Area]:
     """The areas, on both sides if both move, that the reduction gives attachment modes to."""
     assert one.weights is not None
     stiffness = table.stiffness * one.weights
@@ -91,13 +97,9 @@ def _attached(table: ContactAreaTable, one: Found) -> dict[str, cms.Area]:
     }
 
 
-def _listed(table: ContactAreaTable) -> Found:
-    assert isinstance(table.at, list)
-    against = table.against if isinstance(table.against, list) else None
-    along = table.along if isinstance(table.along, list) else None
-    tangents = None if along is None else [str(name) for name in along]
+def _listed(table: ListedAreaTable) -> Found:
     weights = None if table.weights is None else np.array(table.weights)
-    sides = (table.at, against, tangents, table.along_against)
+    sides = (table.at, table.against, table.along, table.along_against)
     return Found(sides, weights, _as_gaps(table.gap))
 
 
@@ -105,9 +107,8 @@ def _as_gaps(gap: float | list[float]) -> Real | float:
     return np.array(gap) if isinstance(gap, list) else gap
 
 
-def _placed(component: fem.Component, table: ContactAreaTable) -> tuple[Found, dict[str, Real]]:
+def _placed(component: fem.Component, table: MeshAreaTable) -> tuple[Found, dict[str, Real]]:
     """The points of an area of a mesh, and the load vectors of their interfaces."""
-    assert isinstance(table.at, str) and table.direction is not None
     points = fem.contact_points(
         component, table.at, table.direction, points=table.points, surface=table.surface
     )
@@ -115,7 +116,7 @@ def _placed(component: fem.Component, table: ContactAreaTable) -> tuple[Found, d
     along = None if table.along is None else _axis(table.along)
     if along is not None:
         vectors[2] = points.vectors(along)
-    if isinstance(table.against, str):
+    if table.against is not None:
         other = fem.opposite_points(component, points, table.against, surface=table.surface_against)
         vectors[1] = other.vectors()
         if along is not None:
@@ -135,11 +136,11 @@ def _placed(component: fem.Component, table: ContactAreaTable) -> tuple[Found, d
     return Found(sides, points.weights, gaps, points.places, points.held), named
 
 
-def _axis(given: str | Sequence[float] | Sequence[str]) -> str | list[float]:
+def _axis(given: str | Sequence[float]) -> str | list[float]:
     return given if isinstance(given, str) else [float(each) for each in given]
 
 
-def _gaps(table: ContactAreaTable, places: Real) -> Real:
+def _gaps(table: MeshAreaTable, places: Real) -> Real:
     """The gap at each point (k,)."""
     if isinstance(table.gap, list) and len(table.gap) != len(places):
         raise SystemModelError(
@@ -147,7 +148,6 @@ def _gaps(table: ContactAreaTable, places: Real) -> Real:
         )
     centre = places.mean(axis=0) if table.centre is None else np.array(table.centre)
     axis = None if table.axis is None else fem.unit_vector(table.called, _axis(table.axis))
-    assert table.direction is not None
     normal = fem.unit_vector(table.called, _axis(table.direction))
     beside = gap_beside(places, normal, centre, slope=table.slope, radius=table.radius, axis=axis)
     return np.asarray(_as_gaps(table.gap)) + beside
@@ -155,8 +155,9 @@ def _gaps(table: ContactAreaTable, places: Real) -> Real:
 
 def areas_found(scene: Scene) -> tuple[Found, ...]:
     """The points of all areas of a scene; its mesh is assembled unless that was done already."""
-    if all(isinstance(table.at, list) for table in scene.contact_areas):
-        return tuple(_listed(table) for table in scene.contact_areas)
+    listed = [_listed(table) for table in scene.contact_areas if isinstance(table, ListedAreaTable)]
+    if len(listed) == len(scene.contact_areas):
+        return tuple(listed)
     if scene._areas_found is None or scene._areas_found[0] != tuple(scene.contact_areas):
         from nldyn.scene.component import build_component  # which calls `with_areas`
 
@@ -169,7 +170,7 @@ def told_of_areas(scene: Scene, reduced: cms.ReducedModel) -> list[str]:
     """What each area of a mesh is, and what the reduction gave to it, a sentence each."""
     sentences = []
     for table, found in zip(scene.contact_areas, areas_found(scene), strict=True):
-        if found.places is None or found.weights is None:
+        if not isinstance(table, MeshAreaTable) or found.places is None or found.weights is None:
             continue
         held = f" ({found.held} more are held by supports)" if found.held else ""
         of = "" if table.points == "nodes" else f" that stand for {found.weights.sum():.4g} m or m²"
@@ -204,7 +205,7 @@ def area_stops(scene: Scene) -> tuple[Stop, ...]:
                 weights=found.weights,
                 exponent=exponent_of(table),
                 gap=found.gaps,
-                direction=table.closes,
+                direction=getattr(table, "closes", 1),
                 against=against,
                 dissipation=table.dissipation,
                 dashpot=table.dashpot,

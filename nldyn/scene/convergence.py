@@ -19,7 +19,7 @@ from nldyn.scene.messages import scene_error
 
 if TYPE_CHECKING:
     from nldyn.runtime.progress import Progress
-    from nldyn.scene.schema import Scene
+    from nldyn.scene.schema.scene import Scene
 
 
 def convergence_study_of(

@@ -6,19 +6,28 @@ import math
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 import fem
 from nldyn.scene.messages import quoted, scene_error, show
-from nldyn.scene.schema import PartTable, Scene
+from nldyn.scene.schema.parts import (
+    AnyPartTable,
+    BeamTable,
+    PartTable,
+    ShellTable,
+    SolidTable,
+    TrussTable,
+)
+from nldyn.scene.schema.scene import Scene
 
 MADE, REFUSED = "made", "refused"
-KINDS = {
-    fem.BeamPart: "beam",
-    fem.TrussPart: "truss",
-    fem.SolidPart: "solid",
-    fem.ShellPart: "shell",
+TABLES: dict[type, type[PartTable]] = {
+    fem.BeamPart: BeamTable,
+    fem.TrussPart: TrussTable,
+    fem.SolidPart: SolidTable,
+    fem.ShellPart: ShellTable,
 }
+PART: TypeAdapter[AnyPartTable] = TypeAdapter(AnyPartTable)
 SAME = 1e-6  # relative
 
 
@@ -41,7 +50,7 @@ def with_described_parts(scene: Scene, mesh: DescribedMesh) -> Scene:
     if scene.mesh is None or not scene.mesh.parts_from_file:
         return scene
     key = ("mesh", "parts_from_file")
-    parts = dict(scene.parts)
+    parts: dict[str, PartTable] = dict(scene.parts)
     for name in named_parts(scene, mesh):
         if name not in mesh.described:
             known = quoted(mesh.described) if mesh.described else "none"
@@ -54,10 +63,10 @@ def with_described_parts(scene: Scene, mesh: DescribedMesh) -> Scene:
             parts[name] = table_of(given[MADE])
             continue
         try:
-            parts[name] = PartTable.model_validate(dict(given))
+            parts[name] = PART.validate_python(dict(given))
         except ValidationError as error:
             first = error.errors()[0]
-            place = ".".join(str(word) for word in first["loc"])
+            place = ".".join(str(word) for word in first["loc"][1:])
             fault = f"names '{name}', whose numbers in the mesh file make no part: {place}: "
             raise scene_error(scene.file, key, fault + first["msg"]) from None
     return scene.model_copy(update={"parts": parts})
@@ -75,8 +84,7 @@ def table_of(part: Any) -> PartTable:
     """The table of a part that the file of the mesh makes whole, with its plain numbers."""
     given = {"thickness": getattr(part, "thickness", None), "area": getattr(part, "area", None)}
     material = part.material
-    table = PartTable.model_construct(
-        kind=KINDS[type(part)],
+    table = TABLES[type(part)].model_construct(
         youngs_modulus=material.youngs_modulus,
         density=material.density,
         poissons_ratio=material.poissons_ratio,
@@ -88,11 +96,11 @@ def table_of(part: Any) -> PartTable:
 
 def told_otherwise(scene: Scene, mesh: DescribedMesh) -> list[str]:
     """A sentence for each part of the scene that the file of its mesh describes otherwise."""
-    own = {n: t for n, t in scene.parts.items() if n in mesh.described and t._made is None}
+    parts = {n: t for n, t in scene.parts.items() if n in mesh.described and t._made is None}
     if scene.mesh and scene.mesh.parts_from_file != "all":
-        own = {n: t for n, t in own.items() if n not in scene.mesh.parts_from_file}
+        parts = {n: t for n, t in parts.items() if n not in scene.mesh.parts_from_file}
     found = []
-    for name, table in own.items():
+    for name, table in parts.items():
         given = mesh.described[name]
         if REFUSED in given:
             found.append(f"part '{name}' is as in the scene, not as in the file: {given[REFUSED]}")
@@ -100,9 +108,9 @@ def told_otherwise(scene: Scene, mesh: DescribedMesh) -> list[str]:
         if MADE in given:
             given = table_of(given[MADE]).model_dump(exclude_none=True)
         other = [
-            f"{key} {show(getattr(table, key))}, not {show(value)}"
+            f"{key} {show(own)}, not {show(value)}"
             for key, value in given.items()
-            if getattr(table, key) not in (None, value) and not _near(getattr(table, key), value)
+            if (own := getattr(table, key, None)) not in (None, value) and not _near(own, value)
         ]
         if other:
             found.append(

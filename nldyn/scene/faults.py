@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from nldyn.base.errors import KeptWorkError, SceneError
-from nldyn.scene.messages import KeyPath, scene_error, table_at
-from nldyn.scene.schema import Scene
+from nldyn.scene.messages import KeyPath, scene_error, tables_at
+from nldyn.scene.schema.scene import Scene
 
 
 @contextmanager
@@ -21,8 +21,7 @@ def told_as(scene: Scene, key: KeyPath, *kinds: type[Exception], hint: str = "")
     except kinds as error:
         text = str(error).rstrip(".") + hint
         word, _, rest = text.partition(" ")
-        table = table_at(Scene, key)
-        if key and table is not None and word in table.model_fields:
+        if key and any(word in table.model_fields for table in tables_at(Scene, key)):
             raise scene_error(scene.file, (*key, word), rest) from error
         if word in Scene.model_fields:  # another table
             raise scene_error(scene.file, (word,), rest) from error

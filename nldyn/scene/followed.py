@@ -8,7 +8,7 @@ from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.scene.checks import STEADY
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import KeyPath, scene_error, unknown_name
-from nldyn.scene.schema import Scene
+from nldyn.scene.schema.scene import Scene
 from nldyn.scene.stops_and_loads import slider_of, sources_before
 from nldyn.system.chart import EVERY_MODE, SPEED, SPIN, THE_FREQUENCY
 from nldyn.system.parameters import OF_STOPS, SHARED, SOURCES, Parameter
@@ -108,7 +108,7 @@ def _of_element(scene: Scene, kind: str, number: int, key: list[str]) -> Paramet
     if kind == "contact_areas":
         return Parameter(f"area_{key[0]}", number)
     if kind == "excitation":
-        if getattr(table, key[0]) is None or table.kind == "base":
+        if getattr(table, key[0], None) is None or table.kind == "base":
             fault = f"names '{name}', which one of kind '{table.kind}' has not, or must keep"
             raise _refused(scene, fault)
         return Parameter(key[0], sources_before(scene, number))
@@ -129,7 +129,7 @@ def _force(scene: Scene) -> str:
     if len(shaking) != 1:
         fault = f"is 'force', but {len(shaking)} loads move the structure; name one, such as "
         raise _refused(scene, f"{fault}'excitation.0.amplitude'")
-    unbalance = scene.excitation[shaking[0]].mass_times_radius is not None
+    unbalance = scene.excitation[shaking[0]].kind == "unbalance"
     return f"excitation.{shaking[0]}.{'mass_times_radius' if unbalance else 'amplitude'}"
 
 

@@ -10,7 +10,7 @@ from nldyn.scene.checks import check_computable
 from nldyn.scene.faults import told_as
 from nldyn.scene.followed import KEY, followed_parameter
 from nldyn.scene.messages import scene_error
-from nldyn.scene.schema import Scene
+from nldyn.scene.schema.scene import Scene
 from nldyn.scene.stops_and_loads import acting_elements
 
 

@@ -21,7 +21,8 @@ from nldyn.base.arrays import Real
 from nldyn.scene.component import readable_path
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import KeyPath, scene_error
-from nldyn.scene.schema import PlaceOfMatrices, Scene
+from nldyn.scene.schema.scene import Scene
+from nldyn.scene.schema.structures import PlaceOfMatrices
 
 
 def build_matrices(scene: Scene) -> cms.Matrices:

@@ -51,6 +51,7 @@ ORDERS = (
     "both are multiples, nearly (5 and 7 for a ratio of 1.4); a harmonic force with a "
     "'frequency_hz' of its own can be simulated in Python"
 )
+NONE_CHOSEN = "none_chosen"  # fault of a key that says which of several tables is meant
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -136,8 +137,10 @@ def from_validation(file: Path, model: type[BaseModel], error: ValidationError) 
     told: dict[KeyPath, str] = {}
     for detail in (*unknown, *details):
         key = _own_steps(model, detail["loc"])
+        if detail["type"] == NONE_CHOSEN:
+            key = (*key, str(detail["ctx"]["key"]))
         if detail["type"] == "extra_forbidden" or key[:-1] not in misspelt:
-            told.setdefault(key, _fault(model, detail))
+            told.setdefault(key, _fault(model, detail, details))
     return scene_error(file, *joined(list(told.items())))
 
 
@@ -158,7 +161,7 @@ def _walked(model: type[BaseModel], key: KeyPath) -> tuple[KeyPath, Any]:
     steps: list[str | int] = []
     for step in key:
         here = _bare(here)
-        tagged = _tagged(here, step)
+        tagged = _tags(here).get(str(step))
         if tagged is not None:  # a step into one of several types
             here = tagged
             continue
@@ -173,27 +176,36 @@ def _walked(model: type[BaseModel], key: KeyPath) -> tuple[KeyPath, Any]:
     return tuple(steps), here
 
 
-def _tagged(annotation: Any, tag: str | int) -> Any:
-    """The one of several types that has a tag, if there is one."""
-    for option in get_args(annotation):
-        if Tag(str(tag)) in get_args(option)[1:]:
-            return option
-    return None
+def _tags(annotation: Any) -> dict[str, Any]:
+    """The types with tags among several."""
+    return {
+        str(each.tag): option
+        for option in get_args(annotation)
+        for each in get_args(option)[1:]
+        if isinstance(each, Tag)
+    }
 
 
-def _fault(model: type[BaseModel], detail: ErrorDetails) -> str:
+def _fault(model: type[BaseModel], detail: ErrorDetails, every: Sequence[ErrorDetails]) -> str:
     kind, given, context = detail["type"], detail["input"], detail.get("ctx", {})
     if kind == "extra_forbidden":
-        return _unknown_key(model, detail["loc"])
+        return _unknown_key(model, detail["loc"], _missing_beside(detail, every))
     if kind == "missing":
-        return "is missing"
+        fields = [table.model_fields for table in _chosen_from(model, detail["loc"]).values()]
+        name = str(detail["loc"][-1])
+        own = any(name not in each or not each[name].is_required() for each in fields)
+        return f"is missing: {detail['loc'][-2]} needs it" if own else "is missing"
+    if kind == NONE_CHOSEN:
+        if context["key"] not in given:
+            return "is missing"
+        return f"must be {context['expected']}, not {show(given[context['key']])}"
     if kind == "value_error":
         return str(context["error"])
     if kind == "literal_error":
         return f"must be {context['expected']}, not {show(given)}"
     if kind == "too_short" and not given:
         return "must not be empty"
-    if kind == "list_type" and isinstance(given, dict) and table_at(model, (*detail["loc"], 0)):
+    if kind == "list_type" and isinstance(given, dict) and tables_at(model, (*detail["loc"], 0)):
         return f"must be written with two brackets: [[{format_key(detail['loc'])}]]"
     if kind == "dict_type" and isinstance(given, list):
         return f"must be written with a name: [{format_key(detail['loc'])}.NAME]"
@@ -237,20 +249,20 @@ def show(value: object) -> str:
     return text if len(text) <= 40 else text[:37] + "..."
 
 
-def _unknown_key(model: type[BaseModel], key: KeyPath) -> str:
+def _unknown_key(model: type[BaseModel], key: KeyPath, missing: Sequence[str]) -> str:
     """Guess the key that was meant: here first, then the same word in another table."""
     name = str(key[-1])
-    here = table_at(model, key[:-1])
     if len(key) == 1 and (hint := _word(name)):
         return f"is not a table of a scene: {hint}"
     if key[0] == "springs" and name in ("between", "to", "from"):
         return f"is not a known key: {BETWEEN}"
+    others = [tag for tag, table in _chosen_from(model, key).items() if name in table.model_fields]
+    if others:
+        needed = f"which needs {quoted(missing)}" if missing else f"but of {' and '.join(others)}"
+        return f"is not a key of {key[-2]}, {needed}"
     if key[0] == "excitation" and name.startswith("frequency"):
         return f"is not a known key: {ORDERS}"
-    known = list(here.model_fields) if here else []
-    law, laws = (key[-2], _bare(_walked(model, key[:-2])[1])) if len(key) > 2 else ("", None)
-    if _tagged(laws, law) and any(name in table.model_fields for table in _tables_in(laws)):
-        return f"is not a key of law '{law}'"
+    known = [name for table in tables_at(model, key[:-1]) for name in table.model_fields]
     guess = nearest(name, known)
     if guess:
         return f"is not a known key; did you mean '{guess}'?"
@@ -268,10 +280,24 @@ def _word(name: str) -> str | None:
     )
 
 
-def table_at(model: type[BaseModel], key: KeyPath) -> type[BaseModel] | None:
-    """Find the table that a key path leads to, of several the first."""
+def _missing_beside(detail: ErrorDetails, every: Sequence[ErrorDetails]) -> list[str]:
+    """The keys that are missing in the table of a fault, if it is the first one there."""
+    table = detail["loc"][:-1]
+    here = [d for d in every if d["loc"][:-1] == table]
+    first = next(d for d in here if d["type"] == detail["type"])
+    return [str(d["loc"][-1]) for d in here if d["type"] == "missing" and first is detail]
+
+
+def _chosen_from(model: type[BaseModel], key: KeyPath) -> dict[str, type[BaseModel]]:
+    """The tables by tags of which one was chosen that a key is in; none where there is but one."""
+    several = _tags(_bare(_walked(model, key[:-2])[1])) if len(key) > 2 else {}
+    return {tag: _bare(each) for tag, each in several.items() if key[-2] in several}
+
+
+def tables_at(model: type[BaseModel], key: KeyPath) -> list[type[BaseModel]]:
+    """Find the table that a key path leads to, or the several that may be there."""
     here = _bare(_walked(model, key)[1])
-    return None if get_origin(here) in (list, dict) else next(_tables_in(here), None)
+    return [] if get_origin(here) in (list, dict) else list(_tables_in(here))
 
 
 def all_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:

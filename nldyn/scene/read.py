@@ -15,7 +15,7 @@ from nldyn.scene.checks import check_scene
 from nldyn.scene.faults import check_regular, lower_first, unreadable
 from nldyn.scene.followed import followed_parameter
 from nldyn.scene.messages import from_validation, scene_error
-from nldyn.scene.schema import Scene
+from nldyn.scene.schema.scene import Scene
 from nldyn.scene.toml_faults import likely_missing
 
 LARGEST_SCENE = 10_000_000  # bytes or letters

@@ -17,7 +17,8 @@ from nldyn.scene.build import Structure, build_structure, build_system
 from nldyn.scene.checks import check_computable, check_held_to_follow, remarks
 from nldyn.scene.faults import told_as
 from nldyn.scene.followed import axis_of
-from nldyn.scene.schema import ContinuationTable, Scene
+from nldyn.scene.schema.computation import ContinuationTable
+from nldyn.scene.schema.scene import Scene
 from nldyn.search.diagram import Diagram, SubharmonicSeed, diagram
 from nldyn.search.exploration import Exploration, ExploreOptions
 from nldyn.search.explore import explore

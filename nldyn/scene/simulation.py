@@ -11,7 +11,7 @@ from nldyn.longterm.lyapunov import LyapunovSpectrum, lyapunov_exponents
 from nldyn.longterm.simulation import Counted, Motion, simulate, sweep
 from nldyn.scene.build import build_system
 from nldyn.scene.faults import told_as
-from nldyn.scene.schema import Scene
+from nldyn.scene.schema.scene import Scene
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from nldyn.runtime.executors import as_finished, check_execution
 from nldyn.scene.build import build_system
 from nldyn.scene.case_fingerprints import case_fingerprints
 from nldyn.scene.read import load_scene, scene_from_tables
-from nldyn.scene.schema import Scene
+from nldyn.scene.schema.scene import Scene
 from nldyn.system.system import System
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from nldyn.scene.build import build_system
 from nldyn.scene.faults import told_as
 from nldyn.scene.followed import axis_of
 from nldyn.scene.messages import scene_error
-from nldyn.scene.schema import Scene
+from nldyn.scene.schema.scene import Scene
 
 
 def sweep_of(

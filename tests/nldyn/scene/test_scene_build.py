@@ -278,8 +278,12 @@ SOLID = (
             r"couplings\[1\]\.face.*'leaf_tip' is not a poi",
         ),
         ('at = "foot"', 'at = "feet"', r"supports\[1\]\.at.*'feet' is not a point or face"),
-        ("poissons_ratio = 0.3", "", r"parts\.beam needs 'poissons_ratio', as it is of kind 'so"),
-        ('kind = "solid"', 'kind = "solid"\nwidth = 0.1', r"'width', which is not a key of a part"),
+        ("poissons_ratio = 0.3", "", r"parts\.beam\.poissons_ratio is missing: kind 'solid'"),
+        (
+            'kind = "solid"',
+            'kind = "solid"\nwidth = 0.1',
+            "width is not a key of kind 'solid'",
+        ),
         ('kind = "solid"', 'kind = "solid"\nthickness = 0.1', "needs both 'plane' and 'thickness'"),
         (
             'model = "structure"',
@@ -413,11 +417,11 @@ def test_a_scene_of_shells(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("thickness = 0.002", "", r"parts\.plate needs 'thickness', as it is of kind 'shell'"),
-        ("poissons_ratio = 0.3", "", "needs 'poissons_ratio', as it is of kind 'shell'"),
-        ("offset = 0.001", "offset = [0.1, 0.0]", "needs one number in 'offset'"),
-        ("offset = 0.001", "offset = [0.1]", "must be two numbers .of a beam. or one"),
-        ("offset = 0.001", "width = 0.1", "'width', which is not a key of a part of kind 'shell'"),
+        ("thickness = 0.002", "", r"parts\.plate\.thickness is missing: kind 'shell'"),
+        ("poissons_ratio = 0.3", "", "poissons_ratio is missing: kind 'shell' needs it"),
+        ("offset = 0.001", "offset = [0.1, 0.0]", "offset must be a number"),
+        ("offset = 0.001", "offset = [0.1]", "offset must be a number"),
+        ("offset = 0.001", "width = 0.1", "width is not a key of kind 'shell', but of kind 'beam'"),
         ('model = "structure"', "", r"parts\.plate\.kind 'shell' needs \[mesh\] with model = 's"),
     ],
 )
@@ -457,8 +461,8 @@ def test_a_scene_of_trusses(tmp_path):
     assert component.model.parts == {"bars": fem.TrussPart(fem.Material(2.1e11, 7800.0), 1e-4)}
     assert component.stiffness.shape == (2, 2)
     for old, new, sentence in (
-        ("area = 1e-4", "", "needs 'area', as it is of kind 'truss'"),
-        ("area = 1e-4", "area = 1e-4\nwidth = 0.1", "'width', which is not a key of a part of kin"),
+        ("area = 1e-4", "", "area is missing: kind 'truss' needs it"),
+        ("area = 1e-4", "area = 1e-4\nwidth = 0.1", "width is not a key of kind 'truss', but of"),
     ):
         with pytest.raises(SceneError, match=sentence):
             parse_scene(text.replace(old, new), tmp_path / "bars.toml")

@@ -122,8 +122,8 @@ def test_friction_beside_an_area_with_friction_is_followed_by_its_own_number(tmp
         ('at = ["left", "right"]', 'at = "left"', "is not a key of an area of a mesh"),
         ("weights = [0.5, 0.25]", "friction = 0.2", "needs both 'friction' and 'along'"),
         ("weights = [0.5, 0.25]", "radius = 2.0", "is not a key of a list of interfaces"),
-        ("weights = [0.5, 0.25]", "points = 3", "'points', which is not a key of a list"),
-        ("weights = [0.5, 0.25]", "surface = 0.1", "'surface', which is not a key of a list"),
+        ("weights = [0.5, 0.25]", "points = 3", "points is not a key of a list"),
+        ("weights = [0.5, 0.25]", "surface = 0.1", "surface is not a key of a list"),
         ("weights = [0.5, 0.25]", "closes = true", "must be 1 or -1"),
     ],
 )
@@ -135,7 +135,7 @@ def test_what_makes_no_area_of_interfaces_is_refused(tmp_path, old, new, said):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('direction = "-y" ', "", "needs 'direction'"),
+        ('direction = "-y" ', "", "direction is missing: an area of a mesh needs it"),
         ('direction = "-y" ', 'direction = "z" ', "nothing of it moves along"),
         ('at = "strip"', 'at = "stripe"', "stripe"),
         ('at = "strip"', 'at = "tip"', "no outer face, edge or beam whose nodes are all in it"),

@@ -119,8 +119,8 @@ def test_what_is_given_twice_is_told_in_words_of_toml(tmp_path, text, fault):
         (
             "stiffness = 5e9",
             "zzz = 1\nstiffness = 5e9",
-            "stops[0].zzz is not a known key; known here: 'at', 'law', 'gap', 'direction', "
-            "'against', 'dashpot', 'dissipation', 'restitution', 'impact_speed', 'stiffness', "
+            "stops[0].zzz is not a known key; known here: 'at', 'against', 'law', 'gap', "
+            "'direction', 'dashpot', 'dissipation', 'restitution', 'impact_speed', 'stiffness', "
             "'exponent', 'radius', 'youngs_modulus', 'poissons_ratio'",
         ),
         ("5e9", "-5e9", "stops[0].stiffness must be greater than 0, not -5000000000.0"),
@@ -177,7 +177,7 @@ def test_what_is_given_twice_is_told_in_words_of_toml(tmp_path, text, fault):
         (
             "stiffness = 5e9",
             "law = 'linear'\nstiffness = 5e9\nexponent = 1.5",
-            "stops[0].exponent is not a key of law 'linear'",
+            "stops[0].exponent is not a key of law 'linear', but of law 'hertz'",
         ),
         (
             "stiffness = 5e9",
@@ -199,8 +199,8 @@ def test_what_is_given_twice_is_told_in_words_of_toml(tmp_path, text, fault):
         (
             '"unbalance"',
             '"harmonic"',
-            "excitation[0] has 'mass_times_radius', which is not a key of kind 'harmonic'; "
-            "use 'amplitude'",
+            "excitation[0].mass_times_radius is not a key of kind 'harmonic', which needs "
+            "'amplitude'",
         ),
         (
             "[continuation]",

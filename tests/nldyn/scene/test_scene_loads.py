@@ -154,7 +154,7 @@ def test_what_is_left_out_of_a_measured_force_is_told():
 @pytest.mark.parametrize(
     ("excitation", "words"),
     [
-        ('kind = "constant"\nat = "x"', "needs 'force'"),
+        ('kind = "constant"\nat = "x"', "force is missing: kind 'constant' needs it"),
         ('kind = "constant"\nat = "x"\nforce = 1.0', "is constant: there is no branch"),
         ('kind = "constant"\nat = "y"\nforce = 1.0', "interface or load vector"),
         ('kind = "harmonic"\nat = "x"\namplitude = 1.0\nharmonic = 0', "harmonic"),
@@ -222,7 +222,7 @@ def test_a_last_sample_that_repeats_the_first_is_asked_about(tmp_path):
     assert one.harmonic == 1 and one.phasor == pytest.approx(1.0, abs=1e-6)
     mean, *_ = sources("closed = false")
     assert mean.force == pytest.approx(1 / 33, abs=1e-6)
-    with pytest.raises(SceneError, match="'closed', which is not a key of kind 'constant'"):
+    with pytest.raises(SceneError, match="closed is not a key of kind 'constant', but of"):
         build_system(parse_scene(GEAR + '[[excitation]]\nkind = "constant"\nat = "x"\n'
                                  "force = 1.0\nclosed = true\n"))  # fmt: skip
 
