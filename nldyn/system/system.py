@@ -1082,7 +1082,7 @@ def same_system(a: System, b: System) -> bool:
 
 
 def _rank(rows: Sequence[Real], columns: int) -> int:
-    return int(np.linalg.matrix_rank(np.array(rows).reshape(-1, columns))) if columns else 0
+    return int(np.linalg.matrix_rank(np.array(rows))) if rows and columns else 0
 
 
 def _of_size(spin: Spin, size: int) -> Spin:
