@@ -41,6 +41,14 @@ class Ring:
         pressed = self.stiffness * power * (1.0 + self.dissipation * rate)
         return pressed * (self.sense * n + self.rub * np.array([-n[1], n[0]]))
 
+    def work_rate(self, q: Vector, v: Vector, surface: float) -> float:
+        """Normal force times the speed of sliding of a surface that itself moves so fast."""
+        away = self.rows @ q - self.centre
+        n = away / np.hypot(*away)
+        x, y = self.rows @ v
+        across = float(n[0] * y - n[1] * x)
+        return float(self.sense * (self.force(q, v) @ n)) * abs(across + surface)
+
 
 @dataclass(frozen=True)
 class Rotor:
@@ -51,6 +59,7 @@ class Rotor:
     stiffness: Vector
     load: Callable[[float], Vector]
     rings: list[Ring]
+    surface: float = 0.0  # speed of what turns
 
     def acceleration(self, t: float, q: Vector, v: Vector, closed: list[bool]) -> Vector:
         total = self.load(t) - self.damping @ v - self.stiffness @ q
@@ -72,18 +81,23 @@ class Rotor:
 
     def followed(
         self, y: Vector, end: float, longest: float, *, columns: bool = False
-    ) -> tuple[Vector, Vector, int]:
-        """State and its derivatives by the start at a time, from zero on, and the events passed."""
+    ) -> tuple[Vector, Vector, int, float]:
+        """State and its derivatives by the start at a time, from zero on, and the events passed.
+
+        And how much the rings have worked: normal force times way of sliding.
+        """
         n, t, count = y.size // 2, 0.0, 0
         closed = [ring.depth(y[:n]) > 0.0 for ring in self.rings]
-        z = np.concatenate([y, np.eye(2 * n).ravel()]) if columns else y
+        z = np.concatenate([y, np.eye(2 * n).ravel() if columns else [], [0.0]])
 
         def rate(t: float, z: Vector) -> Vector:
             q, v = z[:n], z[n : 2 * n]
             moved = [v, self.acceleration(t, q, v, closed)]
             if columns:
                 by = self.jacobian(t, z[: 2 * n], closed)
-                moved.append((by @ z[2 * n :].reshape(2 * n, -1)).ravel())
+                moved.append((by @ z[2 * n : -1].reshape(2 * n, -1)).ravel())
+            rubbing = zip(self.rings, closed, strict=True)
+            moved.append([sum(r.work_rate(q, v, self.surface) for r, now in rubbing if now)])
             return np.concatenate(moved)
 
         while t < end:
@@ -105,4 +119,5 @@ class Rotor:
                 if run.status == 1 and times.size:
                     closed[i] = not closed[i]
                     count += 1
-        return z[: 2 * n], z[2 * n :].reshape(2 * n, -1) if columns else np.eye(0), count
+        by = z[2 * n : -1].reshape(2 * n, -1) if columns else np.eye(0)
+        return z[: 2 * n], by, count, float(z[-1])

@@ -204,7 +204,8 @@ def _describe_round(stop: RoundStop) -> str:
     told += f", dissipation {stop.dissipation:g} s/m" if stop.dissipation else ""
     if not stop.friction:
         return told
-    return f"{told}, friction {stop.friction:g} of a surface at {stop.surface_speed:g} m/s"
+    surface = f"a surface at {stop.surface_speed:g} m/s" if stop.surface_speed else "what whirls"
+    return f"{told}, friction {stop.friction:g} of {surface}"
 
 
 def describe_spring(spring: AnySpring, length: str = "m") -> str:

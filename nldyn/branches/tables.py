@@ -111,7 +111,7 @@ def _friction(orbits: Sequence[Orbit]) -> dict[str, list[float]]:
 
 def friction_names(system: System | None) -> tuple[str, ...]:
     """Names of the columns of dry friction of a system, if it has any."""
-    return ("friction_loss_j", "stuck_share") if system and system.sliders else ()
+    return ("friction_loss_j", "stuck_share") if system and system.rubbing else ()
 
 
 def size_names(system: System | None = None, observe: str = "") -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
-from nldyn.flow.flow_map import Trajectory
+from nldyn.flow.flow_map import FlowMap, Trajectory
 from nldyn.flow.gauss import SMOOTH, fine_table, peaks
 from nldyn.system.friction import Slider
 
@@ -19,7 +19,7 @@ ALIKE = 1e-6  # relative difference of a held slider's acceleration from what it
 
 @dataclass(frozen=True)
 class SliderMeasures:
-    """What one of the `System.sliders` does in a motion, such as a period of an orbit.
+    """What one of `System.rubbing` does in a motion, such as a period of an orbit.
 
     Where it acts on a rotation, rad stands for m, and N m for N. The instants at which it sticks,
     slips and is let go are as exact as states need: at the default `rtol` of the flow map shares
@@ -45,10 +45,14 @@ class SliderMeasures:
         wears off is this times a coefficient of wear over the hardness.
     power : float
         `loss` per second, in W.
+    work_rate : float
+        `pressed_distance` per second, in W. Tubes lose in their supports a volume per second that
+        is this times a measured coefficient of wear.
 
     References
     ----------
-    J. F. Archard (1953), *J. Appl. Phys.* 24, 981-988, for the law of wear.
+    J. F. Archard (1953), *J. Appl. Phys.* 24, 981-988, for the law of wear; N. J. Fisher, A. B.
+    Chow and M. K. Weckwerth (1995), *J. Pressure Vessel Technol.* 117, 312-320, for the work rate.
 
     Examples
     --------
@@ -73,6 +77,7 @@ class SliderMeasures:
     loss: float
     pressed_distance: float
     power: float
+    work_rate: float
 
     def __repr__(self) -> str:
         """One line: where, how far, which share it sticks, and what is lost."""
@@ -84,17 +89,21 @@ class SliderMeasures:
 
 
 def slider_measures(motion: Trajectory) -> tuple[SliderMeasures, ...]:
-    """What the sliders of a motion do in it, in the order of `System.sliders`.
+    """What all that rubs does in a motion, in the order of `System.rubbing`.
 
     Integrals are Gauss quadratures of the flow map's own panels, which end where a slider turns,
     sticks, slips, or is let go.
     """
-    sliders = motion.flow.system.sliders
-    if not sliders:
+    system = motion.flow.system
+    if not system.rubbing:
         return ()
     end = motion.states(np.array([motion.span[1]]))
     ends = np.concatenate([motion.record.start, end])
-    return tuple(_measures_of(motion, number, ends) for number in range(len(sliders)))
+    sliders = range(len(system.sliders))
+    return (
+        *(_measures_of(motion, number, ends) for number in sliders),
+        *(_round_measures(motion, ring, ends) for ring in system.rubbing[len(sliders) :]),
+    )
 
 
 def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
@@ -103,7 +112,7 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
     slider, output = flow.system.sliders[number], len(flow.system.stops) + number
     panels = np.flatnonzero(rec.kind >= 0)
     if slider.stop >= 0:
-        panels = panels[rec.depth[panels, slider.stop].any(axis=1)]
+        panels = _touching(motion, slider.stop)
     duration, place = rec.duration[panels], ends @ flow.rows[output]
     force, inner = rec.force[panels, output], rec.depth[panels, output]
     if slider.tangential_stiffness is not None:  # what slides is not what the spring is fixed to
@@ -116,11 +125,11 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
     pulled = np.where(held, mobility * np.abs(force).max(axis=1, initial=0.0) * duration**2, 0.0)
     slides = np.abs(ways) > np.where(held, UNMOVED, ROUNDING) * (size + pulled)
     along = np.column_stack([place[panels], inner, place[panels + 1]])[slides]
-    lengths = tables.weights[rec.kind[panels[slides]]] * duration[slides, None]
-    moved = tables.weights[SMOOTH] * (along @ tables.derivative.T)
-    moved -= slider.friction.base_speed * lengths  # the way of each node, on what it slides on
+    moved = _ways_of_nodes(flow, along)
+    moved -= slider.friction.base_speed * _times_of_nodes(motion, panels[slides])
     pressed = rec.force[panels[slides], slider.stop] if slider.stop >= 0 else slider.normal_force
     time, loss = float(rec.duration.sum()), float((force[slides] * moved).sum())
+    pressed_distance = float(np.abs(pressed * moved).sum())
     forces = force @ fine_table(tables.nodes.size).T
     return SliderMeasures(
         slider,
@@ -131,8 +140,83 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
         float(duration[slides].sum()) / time,
         1.0 - float(duration.sum()) / time,
         loss,
-        float(np.abs(pressed * moved).sum()),
+        pressed_distance,
         loss / time,
+        pressed_distance / time,
+    )
+
+
+def _ways_of_nodes(flow: FlowMap, values: Real) -> Real:
+    """Ways (k, m) of the nodes of panels, by values (k, m + 2) at starts, nodes and ends."""
+    return np.asarray(flow.tables.weights[SMOOTH] * (values @ flow.tables.derivative.T))
+
+
+def _times_of_nodes(motion: Trajectory, panels: NDArray[np.intp]) -> Real:
+    """Times (k, m) that the nodes of panels stand for."""
+    rec = motion.record
+    return np.asarray(motion.flow.tables.weights[rec.kind[panels]] * rec.duration[panels, None])
+
+
+@dataclass(frozen=True)
+class RoundRub:
+    """How a place rubs along a round clearance, node by node of what the flow map recorded.
+
+    Parameters
+    ----------
+    angle : (k, m)
+        Where it touches, in rad from the first direction to the second.
+    pressed : (k, m)
+        Normal force in N.
+    way : (k, m)
+        How far it slides at the node in m, positive from the first direction to the second.
+    """
+
+    angle: Real
+    pressed: Real
+    way: Real
+
+
+def round_rub(motion: Trajectory, ring: Slider, ends: Real) -> RoundRub:
+    """How a round clearance of `System.rubbing` rubs, by the states at the ends of all pieces."""
+    flow, rec = motion.flow, motion.record
+    stop, rows = flow.system.round_stops[ring.stop], flow.round_rows[ring.stop]
+    panels = _touching(motion, ring.stop)
+    places = []
+    for row, centre in zip(rows, stop.eccentricity, strict=True):
+        at = ends @ flow.rows[row] - centre
+        places.append(np.column_stack([at[panels], rec.depth[panels, row], at[panels + 1]]))
+    x, y = (place[:, 1:-1] for place in places)
+    dx, dy = (_ways_of_nodes(flow, place) for place in places)
+    way = (x * dy - y * dx) / np.hypot(x, y)
+    way -= ring.friction.base_speed * _times_of_nodes(motion, panels)
+    return RoundRub(np.arctan2(y, x), motion.contacts_at_nodes[1][panels, ring.stop], way)
+
+
+def _touching(motion: Trajectory, stop: int) -> NDArray[np.intp]:
+    """The panels in which a stop is closed."""
+    panels = np.flatnonzero(motion.record.kind >= 0)
+    return np.asarray(panels[motion.record.depth[panels, stop].any(axis=1)])
+
+
+def _round_measures(motion: Trajectory, ring: Slider, ends: Real) -> SliderMeasures:
+    """Measures of what slides in a round clearance; it never sticks."""
+    rub, mu = round_rub(motion, ring, ends), ring.friction.coefficient
+    time = float(motion.record.duration.sum())
+    slid = float(motion.record.duration[_touching(motion, ring.stop)].sum()) / time
+    forces = rub.pressed @ fine_table(motion.flow.tables.nodes.size).T
+    pressed_distance = float((rub.pressed * np.abs(rub.way)).sum())
+    return SliderMeasures(
+        ring,
+        False,
+        mu * float(peaks(np.abs(forces)).max(initial=0.0)),
+        float(np.abs(rub.way).sum()),
+        0.0,
+        slid,
+        1.0 - slid,
+        mu * pressed_distance,
+        pressed_distance,
+        mu * pressed_distance / time,
+        pressed_distance / time,
     )
 
 

@@ -532,7 +532,7 @@ class Orbit:
 
     @cached_property
     def friction(self) -> tuple[SliderMeasures, ...]:
-        """What each of the `System.sliders` does in a period of the orbit."""
+        """What each of `System.rubbing` does in a period of the orbit."""
         return slider_measures(self.trajectory)
 
     @cached_property

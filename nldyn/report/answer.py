@@ -145,7 +145,7 @@ def _area_lines(nodes: Sequence[BranchNode], along: Along) -> list[str]:
 def _friction_lines(nodes: Sequence[BranchNode], along: Along) -> list[str]:
     """The largest loss of a slider in a period of the excitation, if there are any."""
     system = nodes[0].orbit.system
-    if not system.sliders:
+    if not system.rubbing:
         return []
 
     def loss(node: BranchNode) -> float:

@@ -285,7 +285,7 @@ def stops_of(orbit: Orbit) -> dict[str, Any]:
 
 def friction_columns(orbit: Orbit) -> list[str]:
     """Heads of the table of what sliders do in a period."""
-    turns = np.array([orbit.system.unit(slider.at) == "rad" for slider in orbit.system.sliders])
+    turns = np.array([orbit.system.unit(slider.at) == "rad" for slider in orbit.system.rubbing])
     units = units_where(OF_SLIDERS, turns) | {"pressed distance": "N m"}
     return ["slider", *(f"{name} ({unit})" for name, unit in units.items())]
 

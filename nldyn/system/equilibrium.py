@@ -407,10 +407,13 @@ def _at_round(system: System, stop: RoundStop, q: Real) -> tuple[Polar, Real]:
 
 
 def _rubbed(system: System, q: Real) -> tuple[Real, Real]:
-    """Friction (n,) of the closed round clearances at rest, and its derivative (n, n)."""
+    """Friction (n,) of the closed round clearances of what turns, and its derivative (n, n).
+
+    What does not turn may rest with any friction up to μN: it is taken to rest without.
+    """
     force, slope = np.zeros(system.size), np.zeros((system.size, system.size))
     for _, stop, c, depth in _closed(system.elastic_stops, system, q):
-        if not isinstance(stop, RoundStop) or not stop.friction:
+        if not isinstance(stop, RoundStop) or not stop.friction or not stop.surface_speed:
             continue
         at, rows = _at_round(system, stop, q)
         normal, across = at.normal[0] @ rows, at.across[0] @ rows

@@ -79,7 +79,7 @@ def _round_name(system: System, stop: RoundStop) -> str:
 
 
 def slider_name(system: System, number: int) -> str:
-    """Name one of the sliders by its interfaces, and by the stop that presses it on.
+    """Name one of all that rubs by its interfaces, and by the stop that presses it on.
 
     Examples
     --------
@@ -89,7 +89,9 @@ def slider_name(system: System, number: int) -> str:
     >>> slider_name(system, 0)
     "friction at 'y', stop at 'x'"
     """
-    slider = system.sliders[number]
+    slider = system.rubbing[number]
+    if slider.stop in system.round_stops:
+        return f"friction, {stop_name(system, slider.stop)}"
     name = f"friction at '{slider.at}'" + (f" against '{slider.against}'" if slider.against else "")
     return f"{name}, {stop_name(system, slider.stop)}" if slider.stop >= 0 else name
 

@@ -120,7 +120,7 @@ def check_exact(system: System, parameter: Parameter) -> None:
         check_index(parameter, "stop", len(system.stops))
         if index not in system.round_stops:
             raise SystemModelError(f"parameter '{name}': stops[{index}] is no round clearance")
-        if name == "rubbing_friction" and not system.round_stops[index].surface_speed:
+        if name == "rubbing_friction" and system.round_stops[index].surface_speed is None:
             raise SystemModelError(
                 f"parameter '{name}': stops[{index}] has no surface_speed, in whose sense it slides"
             )

@@ -16,7 +16,7 @@ from nldyn.system.stop import Stop
 from nldyn.system.values import check_finite, check_not_negative, check_positive
 
 _CENTRES = ("first_eccentricity", "second_eccentricity")
-_NUMBERS = ("stiffness", "clearance", "exponent", "dissipation", "friction", "surface_speed")
+_NUMBERS = ("stiffness", "clearance", "exponent", "dissipation", "friction")
 
 
 class Polar(NamedTuple):
@@ -56,9 +56,11 @@ class RoundStop:
     pin that stands c away from touching. The force :math:`N = k\,\delta^p (1 + a\dot\delta)` acts
     along the radius.
 
-    With friction the body turns, and its surface slides all the time: faster than the whirl goes
-    round. Then :math:`\mu N` acts along the circle, against the sliding. Where the whirl would take
-    the sliding speed through zero, the motion is refused.
+    With friction the surface of the body slides one way while it touches, and :math:`\mu N` acts
+    along the circle, against the sliding. A body that turns slides in the sense of its surface, as
+    long as that is faster than the whirl goes round. One that does not turn, such as a tube in its
+    support, slides by its whirl alone, which goes from the first direction to the second. Where the
+    sliding speed would go through zero, the motion is refused.
 
     Parameters
     ----------
@@ -82,9 +84,9 @@ class RoundStop:
         Another law of the normal force, see `Stop`.
     friction : float
         Coefficient μ of sliding.
-    surface_speed : float
-        Speed in m/s of the surface that turns, ΩR of a rotor, not zero where there is friction;
-        positive if the body turns from the first direction to the second.
+    surface_speed : float, optional
+        Speed in m/s of the surface that turns, ΩR of a rotor, needed where there is friction;
+        positive if the body turns from the first direction to the second, 0 if it does not turn.
 
     Raises
     ------
@@ -108,7 +110,7 @@ class RoundStop:
     dissipation: float = 0.0
     law: ContactLaw | None = None
     friction: float = 0.0
-    surface_speed: float = 0.0
+    surface_speed: float | None = None
     impulsive: ClassVar[bool] = False
     jumps: ClassVar[bool] = False
     dashpot: ClassVar[float] = 0.0
@@ -137,11 +139,13 @@ class RoundStop:
         if not isinstance(self.inside, bool | np.bool_):
             raise SystemModelError(f"{owner}: inside must be True or False, got {self.inside!r}")
         check_not_negative(owner, "friction", self.friction)
-        check_finite(owner, "surface_speed", self.surface_speed)
-        if self.friction and not self.surface_speed:
+        if self.surface_speed is not None:
+            check_finite(owner, "surface_speed", self.surface_speed)
+            object.__setattr__(self, "surface_speed", float(self.surface_speed))
+        elif self.friction:
             raise SystemModelError(
-                f"{owner}: friction needs the surface_speed of what turns: a body that does not "
-                "turn would stick, which round clearances do not know"
+                f"{owner}: friction needs the surface_speed of what turns, which is 0 of a body "
+                "that does not turn"
             )
         _ = self.normal
         object.__setattr__(self, "inside", bool(self.inside))
@@ -194,7 +198,7 @@ class RoundStop:
     @property
     def sliding_speed(self) -> float:
         """Speed of the surface, without the whirl, where it touches: from first to second."""
-        return self.sense * self.surface_speed
+        return self.sense * (self.surface_speed or 0.0) + 0.0  # never -0.0, whose sense is another
 
     @property
     def rub(self) -> float:

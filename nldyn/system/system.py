@@ -458,6 +458,18 @@ class System:
         )
 
     @cached_property
+    def rubbing(self) -> tuple[Slider, ...]:
+        """All that friction acts on: the sliders, then what slides in round clearances."""
+        rings = [
+            Slider(
+                stop.at, stop.against, Friction(stop.friction, base_speed=-stop.sliding_speed), i
+            )
+            for i, stop in self.round_stops.items()
+            if stop.friction
+        ]
+        return (*self.sliders, *rings)
+
+    @cached_property
     def sprung(self) -> tuple[int, ...]:
         """Numbers of the sliders behind springs, whose places are coordinates of the state."""
         return tuple(i for i, s in enumerate(self.sliders) if s.tangential_stiffness is not None)

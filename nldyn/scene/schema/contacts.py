@@ -203,10 +203,11 @@ class RoundClearanceTable(Table):
     dissipation: NotNegative = 0.0
     """[s/m] Loss of the contact (Hunt and Crossley): it grows with the penetration, 0 or more."""
     friction: NotNegative = 0.0
-    """Coefficient of the friction along the circle; its surface slides all the time."""
-    surface_speed: Number = 0.0
+    """Coefficient of the friction along the circle; it slides one way while it touches."""
+    surface_speed: Number | None = None
     """[m/s] Speed of the surface that turns, ΩR of a rotor, above 0 if it turns from the first
-    direction to the second. Needed where there is `friction`."""
+    direction to the second; 0 of what does not turn, and whirls from the first direction to the
+    second. Needed where there is `friction`."""
 
     @model_validator(mode="after")
     def _makes_sense(self) -> RoundClearanceTable:
@@ -216,8 +217,8 @@ class RoundClearanceTable(Table):
             raise ValueError("needs other interfaces than its own in 'against'")
         if self.law == "linear":
             refuse(self, ("exponent",), "law 'linear'")
-        if self.friction and not self.surface_speed:
-            raise ValueError("has 'friction', which needs the 'surface_speed' of what turns")
+        if self.friction and self.surface_speed is None:
+            raise ValueError("has 'friction', which needs the 'surface_speed' of what turns, or 0")
         return self
 
     @property

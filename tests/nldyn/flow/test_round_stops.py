@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from nldyn import (
     ConstantForce,
+    ConvergenceError,
     FlowMap,
     HarmonicForce,
     Parameter,
@@ -32,6 +33,7 @@ from nldyn.orbits.bordered import length_unit
 from nldyn.system import DryFriction
 from nldyn.system.chart import value_of, with_value
 from nldyn.system.equilibrium import rest
+from nldyn.system.naming import slider_name
 from tests.rubbing import Ring, Rotor
 
 MASS, STIFFNESS, DAMPING, CLEARANCE = 2.0, 8e3, 6.0, 1e-3
@@ -115,6 +117,64 @@ def test_full_annular_rub_is_that_in_closed_form(stop):
     assert orbit.liouville_error < 1e-11
 
 
+@pytest.mark.parametrize("surface", [5.0, -5.0, 0.0])
+def test_a_rub_all_around_wears_as_in_closed_form(surface):
+    """The work rate of tubes is N v, friction's power μ N v; 0 of what does not turn."""
+    stop = RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=0.05, surface_speed=surface)
+    whirl = Whirl(stop, 2e-3, 12.0)
+    orbit = solve_orbit(jeffcott([stop]), 12.0, guess=whirl.state * (1.0 + 1e-4))
+    (found,) = orbit.friction
+    rate = whirl.force * abs(surface + whirl.w * whirl.r)
+    assert found.power == pytest.approx(0.05 * rate, rel=1e-11)
+    assert found.work_rate == pytest.approx(rate, rel=1e-11)
+    assert found.pressed_distance == pytest.approx(rate / 12.0, rel=1e-11)
+    assert found.peak_force == pytest.approx(0.05 * whirl.force, rel=1e-9)
+    assert (found.stuck, found.slid, found.open) == (0.0, 1.0, 0.0)
+    assert slider_name(orbit.system, 0) == "friction, ring at 'x', 'y'"
+
+
+def elliptic(sense=-1.0, inside=True):
+    """A disc that does not turn, carried round on an ellipse, and the same for integration."""
+    ring = RoundStop(
+        ("x", "y"), 5e4, CLEARANCE, 1.0, (0.0, 0.0) if inside else (1.4e-3, 0.0), inside,
+        friction=0.2, surface_speed=0.0,
+    )  # fmt: skip
+    forces = [HarmonicForce("x", 3.0), HarmonicForce("y", 2.0, phase_deg=sense * 90.0)]
+    system = System.from_matrices(
+        MASS * np.eye(2), STIFFNESS * np.eye(2), PLANE, damping=4.0 * DAMPING * np.eye(2),
+        stops=[ring], excitation=forces,
+    )  # fmt: skip
+    rows = np.eye(2)
+    same = Ring(rows, 5e4, CLEARANCE, 1.0, ring.eccentricity, ring.sense, 0.0, ring.rub)
+
+    def rotor(w):
+        def load(t):
+            return np.array([3.0 * math.cos(w * t), 2.0 * math.cos(w * t + sense * np.pi / 2.0)])
+
+        return Rotor(MASS * rows, 4.0 * DAMPING * rows, STIFFNESS * rows, load, [same])
+
+    return system, rotor
+
+
+@pytest.mark.parametrize(("hz", "inside"), [(8.5, True), (9.5, True), (4.4, False)])
+def test_work_rates_of_what_does_not_turn_are_those_of_an_independent_integration(hz, inside):
+    system, rotor = elliptic(sense=-1.0 if inside else 1.0, inside=inside)
+    orbit = solve_orbit(system, hz)
+    (found,) = orbit.friction
+    assert 0.1 < found.open < 0.99
+    start = orbit.states(np.zeros(1))[0] / math.sqrt(MASS)
+    end, _, _, work = rotor(orbit.omega).followed(start, orbit.duration, orbit.duration / 400)
+    assert end == pytest.approx(start, abs=1e-8 * np.abs(start).max())
+    assert found.work_rate == pytest.approx(hz * work, rel=1e-8)
+    assert found.loss == pytest.approx(0.2 * work, rel=1e-8)
+
+
+def test_what_whirls_the_other_way_is_refused():
+    system, _ = elliptic(sense=1.0)
+    with pytest.raises(ConvergenceError, match="sliding speed"):
+        solve_orbit(system, 8.5)
+
+
 def test_friction_makes_the_whirl_unstable_where_the_frame_that_turns_says():
     def growth(mu):
         stop = RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=mu, surface_speed=5.0)
@@ -174,7 +234,7 @@ def check_against_integration(seed):
     flow = FlowMap(system)
     found = flow.shoot(flow.to_state(np.linalg.solve(basis, start))[None], PERIOD, w)
     assert not found.failure
-    end, columns, _ = rotor.followed(start, 2.0 * np.pi / w, 2.0 * np.pi / w / 400, columns=True)
+    end, columns, *_ = rotor.followed(start, 2.0 * np.pi / w, 2.0 * np.pi / w / 400, columns=True)
     n = start.size // 2
     ours = basis @ flow.to_modal(found.ends[0])
     assert np.abs(ours - end)[:n].max() < 1e-8 * np.abs(end[:n]).max()
@@ -581,7 +641,7 @@ def test_clearances_between_bodies_in_clearances_move_as_an_independent_integrat
     depth, _ = flow.trajectory(begin, PERIOD, w).contacts_at_nodes
     assert not found.failure and depth.any(axis=(0, 2)).all()  # each of them touches
     rotor = Rotor(M, C, K, load_at, rings)
-    end, columns, _ = rotor.followed(start, 2.0 * np.pi / w, 2.0 * np.pi / w / 400, columns=True)
+    end, columns, *_ = rotor.followed(start, 2.0 * np.pi / w, 2.0 * np.pi / w / 400, columns=True)
     ours = basis @ flow.to_modal(found.ends[0])
     assert np.abs(ours - end)[:4].max() < 1e-8 * np.abs(end[:4]).max()
     assert np.abs(ours - end)[4:].max() < 1e-8 * np.abs(end[4:]).max()

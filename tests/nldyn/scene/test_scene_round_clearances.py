@@ -1,8 +1,9 @@
 """``[[round_clearances]]`` of a scene."""
 
+import numpy as np
 import pytest
 
-from nldyn import Parameter, RoundStop
+from nldyn import Parameter, RoundStop, continue_branch, solve_orbit
 from nldyn.app.describe import describe_stop
 from nldyn.base.errors import SceneError
 from nldyn.base.resources import example
@@ -11,6 +12,7 @@ from nldyn.scene.backbone import undamped
 from nldyn.scene.build import build_system
 from nldyn.scene.followed import followed_parameter
 from nldyn.scene.read import load_scene
+from tests.rubbing import Ring, Rotor
 
 SCENE = example("rotor_in_a_ring.toml").read_text()
 RING = RoundStop(("x", "y"), 2e6, 6e-4, 1.0, friction=0.08, surface_speed=5.0)
@@ -91,3 +93,25 @@ def test_its_numbers_may_change(tmp_path, key, parameter):
 def test_faults_are_told(tmp_path, change, said):
     with pytest.raises(SceneError, match=said):
         build_system(scene_of(tmp_path, change))
+
+
+def test_a_tube_wears_in_its_support_as_an_independent_integration_says():
+    system = build_system(load_scene(example("tube_with_friction.toml")))
+    orbit = continue_branch(solve_orbit(system, 17.0), (17.0, 18.0)).points[-1]
+    (found,) = orbit.friction
+    assert orbit.impacts == 2 and 0.3 < found.open < 0.8
+    rows = np.array(system.stop_vectors(system.stops[0]))
+    pushed = np.array([system.participation[name] for name in ("flow_y", "flow_z")])
+
+    def load(t):
+        w = orbit.omega
+        return np.array([2.0 * np.cos(w * t), 1.6 * np.sin(w * t)]) @ pushed
+
+    natural = 2.0 * np.pi * system.frequencies_hz
+    ring = Ring(rows, 1e5, 3e-4, rub=0.2)
+    tube = Rotor(np.eye(system.size), np.diag(0.06 * natural), np.diag(natural**2), load, [ring])
+    start = orbit.states(np.zeros(1))[0]
+    end, _, touches, work = tube.followed(start, orbit.duration, orbit.duration / 400)
+    assert touches == 4
+    assert end == pytest.approx(start, abs=1e-7 * np.abs(start).max())
+    assert found.work_rate == pytest.approx(work / orbit.duration, rel=1e-8)
