@@ -227,6 +227,10 @@ def accuracy(component: ComponentLike, reduced: ReducedModel) -> Accuracy:
     check_belongs(pencil, reduced)
     if reduced.method in ("craig-bampton", "guyan"):
         return accuracy_fixed(pencil, reduced)
+    if reduced.method == "macneal" and reduced.residual_modes:
+        raise ReductionError(
+            "the error is known only where all interfaces have mass, or none of them has"
+        )
     shifted = shifted_factor(pencil)
     pencil = without_offsets(pencil, shifted)
     modes = with_next(pencil, shifted, reduced, pencil.loads)

@@ -22,6 +22,12 @@ from cms.component.component import (
     times,
 )
 from cms.reduction.area import Area
+from cms.reduction.boundary import (
+    check_massless,
+    massless_boundary,
+    told_of_massless,
+    with_flexibility,
+)
 from cms.reduction.condensed import condensed
 from cms.reduction.constraint import fixed_interface, fixed_interface_errors
 from cms.reduction.doubt import check_doubtful_digits
@@ -70,6 +76,7 @@ def reduce(
     residual: bool = True,
     unseen: bool = False,
     areas: Mapping[str, Area] | None = None,
+    massless: Sequence[str] | None = None,
     progress: Progress | None = None,
 ) -> ReducedModel:
     r"""Reduce a component by component mode synthesis.
@@ -108,6 +115,10 @@ def reduce(
         Interfaces that are points of areas of contact: they share as few attachment modes as the
         static deflection needs, told in the model's ``areas``; the component's own ``areas`` unless
         given. For "rubin" and "craig-chang"; by fixed-interface methods each point has its own.
+    massless : sequence of str, optional
+        Of "macneal": the interfaces whose residual modes have no mass, all unless given; the others
+        have theirs as by "rubin". A rigid or linear stop of `nldyn` at such a massless boundary
+        converges with the modes [7]_; loads act on interfaces with mass.
     progress : callable, optional
         Called as ``progress(text)`` with what is to be done, how much memory it needs, and which
         solver does it.
@@ -143,6 +154,8 @@ def reduce(
     .. [5] Rixen, D.J. (2004) A dual Craig-Bampton method for dynamic substructuring. Journal of
        Computational and Applied Mathematics 168, 383-391.
     .. [6] Guyan, R.J. (1965) Reduction of stiffness and mass matrices. AIAA Journal 3(2), 380.
+    .. [7] Monjaraz-Tec, C., Gross, J. and Krack, M. (2022) A massless boundary component mode
+       synthesis method for elastodynamic contact problems. Computers & Structures 260, 106698.
 
     Examples
     --------
@@ -168,12 +181,15 @@ def reduce(
     pencil = checked_pencil(component)
     check_count(modes, method, pencil)
     shared = getattr(component, "areas", {}) if areas is None else areas
+    if massless is not None:
+        check_massless(massless, method, pencil.names, shared)
     if method in FIXED and not pencil.names:
         raise ReductionError(f"method '{method}' needs an interface, and the component has none")
+    free = partial(reduced_free, areas=shared, massless=massless)
     with announced(progress), one_thread():
         check_doubtful_digits(component, pencil)
         try:
-            by_method = reduced_fixed if method in FIXED else partial(reduced_free, areas=shared)
+            by_method = reduced_fixed if method in FIXED else free
             reduced, left_out = by_method(pencil, modes, cutoff_hz, method, unseen)
             if couples(getattr(component, "damping", None), reduced.basis, left_out):
                 reduced, _ = by_method(pencil, modes, cutoff_hz, method, True)
@@ -194,7 +210,7 @@ def told(reduced: ReducedModel, pencil: Pencil, asked: int | None) -> ReducedMod
     if reduced.unseen_modes:
         numbers = ", ".join(map(str, reduced.unseen_modes))
         announce(f"kept modes that move no interface: {numbers}")
-    for sentence in told_of_seen(reduced, asked):
+    for sentence in (*told_of_seen(reduced, asked), *told_of_massless(reduced)):
         announce(sentence)
     rigid = reduced.basis[:, reduced.frequencies_hz == 0.0]
     if pencil.digits is None or not rigid.shape[1]:
@@ -237,6 +253,7 @@ def reduced_free(
     method: str,
     unseen: bool,
     areas: Mapping[str, Area],
+    massless: Sequence[str] | None,
 ) -> tuple[ReducedModel, FloatArray]:
     """Free-interface modes with what the method adds to them, and the modes left out (N, k)."""
     shifted = shifted_factor(pencil)
@@ -244,7 +261,7 @@ def reduced_free(
     if method != "truncation":
         check_rigid_kept(modes, shifted)
     kept, left_out = kept_modes(pencil, shifted, modes, cutoff_hz, unseen, pencil.loads)
-    model = with_residuals(pencil, shifted, kept, cutoff_hz, method, areas)
+    model = with_residuals(pencil, shifted, kept, cutoff_hz, method, areas, massless)
     return replace(model, left_out_hz=in_hz(left_out)), left_out.vectors
 
 
@@ -255,36 +272,33 @@ def with_residuals(
     cutoff_hz: float | None,
     method: str,
     areas: Mapping[str, Area],
+    massless: Sequence[str] | None,
 ) -> ReducedModel:
     """The model of the kept modes and what a free-interface method adds to them."""
     if method == "truncation":
         if kept.squares.size == 0:
             raise ReductionError(nothing_kept(cutoff_hz))
         return assembled(pencil, kept, 0, method)
-    if method == "macneal":
+    if method == "macneal" and massless is None:
         if kept.squares.size == 0:
             raise ReductionError(
                 "method 'macneal' needs at least one mode: what it adds is massless"
             )
         shapes = residual_flexibility(pencil, shifted, kept.vectors)
-        flexibility = pencil.loads.T @ shapes
-        return replace(
-            assembled(pencil, kept, 0, method),
-            residual_flexibility=(flexibility + flexibility.T) / 2,
-            residual_shapes=shapes,
-        )
-    extra = residual_modes(pencil, shifted, kept.vectors, areas)
+        return with_flexibility(assembled(pencil, kept, 0, method), pencil, shapes)
+    massive = [name for name in pencil.names if name not in (massless or ())]
+    extra = residual_modes(pencil, shifted, kept.vectors, areas, massive)
     if kept.squares.size + extra.squares.size == 0:
         raise ReductionError(nothing_kept(cutoff_hz))
     errors = mode_errors(pencil, shifted, extra.squares, extra.vectors)
     added = Modes(extra.squares, extra.vectors, errors)
     whole = replace(assembled(pencil, kept, extra.dropped, method, added), areas=extra.attached)
+    if massless:
+        shapes = massless_boundary(pencil, shifted, kept.vectors, extra, massless)
+        return with_flexibility(whole, pencil, shapes)
     if not extra.massless.shape[1]:
         return whole
-    direct = extra.massless.T @ pencil.loads
-    return replace(
-        whole, residual_flexibility=direct.T @ direct, residual_shapes=extra.massless @ direct
-    )
+    return with_flexibility(whole, pencil, extra.massless @ (extra.massless.T @ pencil.loads))
 
 
 def reduced_fixed(
@@ -393,8 +407,8 @@ def with_component_damping(reduced: ReducedModel, component: ComponentLike) -> R
         )
     if reduced.has_massless_part:
         raise ReductionError(
-            "method 'macneal' has no exact form of a damping matrix: use 'rubin', or "
-            "'with_damping' for modal damping"
+            f"a model by '{reduced.method}' with a massless part has no exact form of a damping "
+            "matrix: use 'rubin', or 'with_damping' for modal damping"
         )
     return replace(reduced, damping=reduced.basis.T @ times(damping, reduced.basis))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -66,8 +66,9 @@ def residual_modes(
     shifted: Shifted,
     modes: FloatArray,
     areas: Mapping[str, Area] = MappingProxyType({}),
+    names: Sequence[str] | None = None,
 ) -> ResidualModes:
-    """Residual flexibility modes of all interfaces, projected on K and M and diagonalised.
+    """Residual flexibility modes of interfaces, projected on K and M and diagonalised.
 
     Parameters
     ----------
@@ -79,6 +80,8 @@ def residual_modes(
         The kept, mass-normalised modes, with all rigid-body modes among them.
     areas : mapping of str to Area
         Interfaces that share a few.
+    names : sequence of str
+        The interfaces; all unless given.
 
     Returns
     -------
@@ -91,11 +94,13 @@ def residual_modes(
     energy matrix reveal the rank; those below 1e-12 (a change of at most 1e-12 in the static
     flexibility) are dropped.
     """
-    static, loads = elastic_solutions(pencil, shifted, pencil.loads), pencil.loads
+    names = pencil.names if names is None else names
+    loads = pencil.loads[:, [pencil.names.index(name) for name in names]]
+    static = elastic_solutions(pencil, shifted, loads)
     attached: dict[str, Attached] = {}
     if areas:
         left = without_modes(static, modes, pencil)
-        chosen, attached = gathered(areas, pencil.names, loads, left)
+        chosen, attached = gathered(areas, names, loads, left)
         static, loads = static @ chosen, loads @ chosen
     size = np.sqrt(np.maximum(np.sum(loads * static, axis=0), 0.0))
     static = static * quotient(np.ones_like(size), size)

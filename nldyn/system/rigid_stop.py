@@ -9,8 +9,9 @@ from typing import ClassVar
 
 from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.system.contact_law import ContactLaw, numba_for
+from nldyn.system.friction import Friction
 from nldyn.system.round_stop import RoundStop
-from nldyn.system.stop import Stop
+from nldyn.system.stop import Stop, check_tangent
 from nldyn.system.values import check_sides
 
 Restitution = Callable[[float], tuple[float, float]]
@@ -43,6 +44,8 @@ class RigidStop:
         Sign of the displacement that closes the gap.
     against : str, optional
         Interface on the other side; the ground unless given.
+    tangent, friction, tangent_against : optional
+        As for a `Stop`; for points without mass alone, see `System.from_reduced`.
 
     Raises
     ------
@@ -65,6 +68,9 @@ class RigidStop:
     gap: float = 0.0
     direction: int = 1
     against: str | None = None
+    tangent: str | None = None
+    friction: Friction | float | None = None
+    tangent_against: str | None = None
     impulsive: ClassVar[bool] = True
     sharp: ClassVar[bool] = True
     jumps: ClassVar[bool] = True
@@ -86,6 +92,9 @@ class RigidStop:
                 "stop with a stiffness"
             )
         check_sides(owner, self.at, self.against, self.direction)
+        ends = (self.tangent, self.tangent_against)
+        law = check_tangent(owner, self.at, ends, self.friction)
+        object.__setattr__(self, "friction", law)
 
     @property
     def law(self) -> ContactLaw | None:

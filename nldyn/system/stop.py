@@ -219,6 +219,28 @@ def _ratio_without_pull(lost: float) -> float:
     return float(brentq(excess, 0.0, max(1.0, math.exp(0.5 * lost)), xtol=TINY, rtol=DIGITS))
 
 
+def check_tangent(
+    owner: str, at: str, ends: tuple[str | None, str | None], friction: Friction | float | None
+) -> Friction | None:
+    """The law of friction along a stop's tangent, whose two ends are given; None without any.
+
+    Raises
+    ------
+    SystemModelError
+        Where friction or its tangent is missing, or the tangent is no interface of its own.
+    """
+    tangent, against = ends
+    for name, end in (("tangent", tangent), ("tangent_against", against)):
+        check_types(**{f"{owner}: {name}": (end, str, None)})
+    if friction is None and tangent is None and against is None:
+        return None
+    if friction is None or tangent is None:
+        raise SystemModelError(f"{owner}: friction needs both friction and tangent")
+    if tangent in (at, against):
+        raise SystemModelError(f"{owner}: tangent must be another interface")
+    return as_friction(owner, friction)
+
+
 @dataclass(frozen=True)
 class Stop:
     r"""One-sided contact: :math:`F = k\,\delta^p (1 + a\dot\delta) + c\,\dot\delta` for δ > 0.
@@ -330,15 +352,12 @@ class Stop:
         self._check_friction(owner)
 
     def _check_friction(self, owner: str) -> None:
-        ends = {"tangent": self.tangent, "tangent_against": self.tangent_against}
-        check_types(**{f"{owner}: {name}": (end, str, None) for name, end in ends.items()})
-        given = (self.friction, self.tangent, self.tangent_against, self.tangential_stiffness)
-        if all(one is None for one in given):
+        ends = (self.tangent, self.tangent_against)
+        law = check_tangent(owner, self.at, ends, self.friction)
+        if law is None and self.tangential_stiffness is None:
             return
-        if self.friction is None or self.tangent is None:
+        if law is None:
             raise SystemModelError(f"{owner}: friction needs both friction and tangent")
-        if self.tangent in (self.at, self.tangent_against):
-            raise SystemModelError(f"{owner}: tangent must be another interface")
         if (self.dashpot and self.pulls) or self.dissipation or self.law is not None:
             raise SystemModelError(
                 f"{owner}: friction needs a force that never pulls: no dissipation, no law of your "
@@ -346,7 +365,6 @@ class Stop:
             )
         if self.dashpot and self.tangential_stiffness is not None:
             raise SystemModelError(f"{owner}: give either a dashpot or a tangential_stiffness")
-        law = as_friction(owner, self.friction)
         object.__setattr__(self, "friction", law)
         check_spring(owner, self.tangential_stiffness, law)
 

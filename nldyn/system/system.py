@@ -26,6 +26,7 @@ from nldyn.system.linear import (
     without_rounding,
 )
 from nldyn.system.loads import BaseMotion, Excitation, HarmonicForce
+from nldyn.system.massless_boundary import MasslessBoundary
 from nldyn.system.ride import NO_RIDE, Ride, carried_apart, told_apart
 from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.round_stop import Polar, RoundStop
@@ -329,10 +330,18 @@ class System:
         Raises
         ------
         SystemModelError
-            If it is no reduced model, or part of its flexibility has no mass
-            (`residual_flexibility`), as by MacNeal's method: its interfaces would move at once
-            under a force; or if modes are left out that a skew matrix may couple. See also
-            `System`.
+            If it is no reduced model; if what acts on interfaces without mass is neither a rigid
+            or linear stop nor dry friction, or such contacts have more than 5 % of the flexibility
+            without mass in common; or if modes are left out that a skew matrix may couple. See
+            also `System`.
+
+        Notes
+        -----
+        Interfaces whose flexibility has no mass (`residual_flexibility`), as by
+        ``cms.reduce(..., method="macneal", massless=[...])``, follow the forces there at once. A
+        `RigidStop` at one is the linear `Stop` of that flexibility, friction at it has the spring
+        of that of its tangent, and the displacement there is that of the modes, without what gives
+        way: see docs/how-to/massless_boundary.md.
         """
         if not (hasattr(reduced, "frequencies_hz") and hasattr(reduced, "participation")):
             raise SystemModelError(
@@ -340,12 +349,9 @@ class System:
                 f"{shown(reduced)}"
             )
         massless = getattr(reduced, "residual_flexibility", None)
+        elements = _listed(acting)
         if massless is not None and np.any(massless):
-            raise SystemModelError(
-                "part of the reduced model's flexibility has no mass "
-                f"(method '{getattr(reduced, 'method', 'unknown')}'), so that its interfaces have "
-                "no equation of motion; reduce by 'rubin' or 'craig-bampton' instead"
-            )
+            elements = MasslessBoundary(tuple(reduced.participation), massless).acting(elements)
         given = (gyroscopic, circulatory, spin)
         if getattr(reduced, "left_out_hz", ()) and any(one is not None for one in given):
             raise SystemModelError(
@@ -376,7 +382,7 @@ class System:
             circulatory=(
                 None if circulatory is None else skew("circulatory", circulatory, system.size)
             ),
-            **_listed(acting),
+            **elements,
         )._spun(None if spin is None else _of_size(spin, system.size))
 
     @property
@@ -938,6 +944,12 @@ class System:
 
     def _check_sliders(self) -> None:
         """Refuse sliders that hold one motion together: what each holds would not be told."""
+        for stop in self.rigid_stops.values():
+            if stop.friction is not None:
+                raise SystemModelError(
+                    f"rigid stop at '{stop.at}': friction needs a point without mass, see "
+                    "cms.reduce with method 'macneal' and massless"
+                )
         for slider in (self.sliders[number] for number in self.sprung):
             if not np.any(self.vector_between(slider.at, slider.against)):
                 raise SystemModelError(
