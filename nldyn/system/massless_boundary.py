@@ -16,6 +16,7 @@ from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.round_stop import RoundStop
 from nldyn.system.stop import Stop
 
+NEGATIVE = 1e-9  # of the largest eigenvalue of a flexibility: one that is not rounding
 MOST_COMMON = 0.05  # share of their massless flexibility that two contacts may have in common
 
 Ends = tuple[str | None, str | None]
@@ -45,6 +46,14 @@ class MasslessBoundary:
     names: Sequence[str]
     flexibility: Real
 
+    def __post_init__(self) -> None:
+        values = np.linalg.eigvalsh(self.flexibility)
+        if values[0] < -NEGATIVE * np.abs(values).max():
+            raise SystemModelError(
+                "the reduced model has a negative flexibility without mass, as components that are "
+                "joined by 'dual-craig-bampton': reduce them by 'rubin' or 'craig-bampton'"
+            )
+
     @property
     def bare(self) -> frozenset[str]:
         """Interfaces that have no mass."""
@@ -58,8 +67,8 @@ class MasslessBoundary:
     def _signed(self, ends: Ends) -> Real:
         vector = np.zeros(len(self.names))
         for end, sign in zip(ends, (1.0, -1.0), strict=True):
-            if end in self.names:
-                vector[list(self.names).index(end)] += sign
+            if end is not None and end in self.names:
+                vector[self.names.index(end)] += sign
         return vector
 
     def acting(self, elements: Mapping[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
@@ -93,8 +102,8 @@ class MasslessBoundary:
         for end in (element.at, getattr(element, "against", None)):
             if end in self.bare:
                 raise SystemModelError(
-                    f"{what}: '{end}' has no mass, so that it has no equation of motion: only stops "
-                    "and dry friction act there. Reduce by 'rubin' or 'craig-bampton', or by "
+                    f"{what}: '{end}' has no mass, so that it has no equation of motion: only "
+                    "stops and dry friction act there. Reduce by 'rubin' or 'craig-bampton', or by "
                     "'macneal' with massless = [...], the interfaces where stops act alone"
                 )
 
@@ -109,11 +118,11 @@ class MasslessBoundary:
         give = self.between((stop.at, stop.against), (stop.at, stop.against))
         if isinstance(stop, RigidStop):
             return stop if give == 0.0 else self._closed(stop, give)
-        softer = {} if give == 0.0 else {"stiffness": self._series(stop, give)}
+        stiffness = stop.stiffness if give == 0.0 else self._series(stop, give)
         if stop.friction is None:
-            return replace(stop, **softer)
+            return replace(stop, stiffness=stiffness)
         spring = self._spring((stop.tangent, stop.tangent_against), stop)
-        return replace(stop, **softer, tangential_stiffness=spring)
+        return replace(stop, stiffness=stiffness, tangential_stiffness=spring)
 
     def _closed(self, stop: RigidStop, give: float) -> Stop:
         """A rigid stop: a linear one with the stiffness of what gives way at once."""
@@ -136,13 +145,13 @@ class MasslessBoundary:
         """Stiffness of a linear stop in series with a flexibility."""
         if not stop.is_linear or stop.law or stop.dashpot or stop.dissipation or stop.area:
             raise SystemModelError(
-                f"stop at '{stop.at}', which has no mass: only a rigid stop or a linear one without "
-                "a loss can act there, and no area; reduce by 'rubin' for others"
+                f"stop at '{stop.at}', which has no mass: only a rigid stop or a linear one "
+                "without a loss can act there, and no area; reduce by 'rubin' for others"
             )
         return 1.0 / (1.0 / stop.stiffness + give)
 
     def _spring(self, ends: Ends, of: Stop | DryFriction | None) -> float | None:
-        """Stiffness of the spring before what slides, in series with what gives way; None for none."""
+        """Stiffness of the spring before what slides, with what gives way, or None."""
         own, give = None if of is None else of.tangential_stiffness, self.between(ends, ends)
         if give == 0.0:
             return own
@@ -163,9 +172,9 @@ class MasslessBoundary:
             if common <= MOST_COMMON * both or (min(i, j) >= 0 and facing(stops[i], stops[j])):
                 continue
             raise SystemModelError(
-                f"contacts at {told(ends)} and {told(others)} have {100.0 * common / both:.3g} % of "
-                f"their flexibility without mass in common, more than {100.0 * MOST_COMMON:g} %: "
-                "keep more modes, or reduce by 'rubin'"
+                f"contacts at {told(ends)} and {told(others)} have {100.0 * common / both:.3g} % "
+                f"of their flexibility without mass in common, more than {100.0 * MOST_COMMON:g} %"
+                ": keep more modes, or reduce by 'rubin'"
             )
 
 

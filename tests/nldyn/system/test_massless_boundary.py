@@ -1,6 +1,8 @@
 """Stops at points without mass: closed forms, other reductions, integration from event to event."""
 
 import math
+import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -241,6 +243,28 @@ def test_what_two_contacts_have_in_common_is_told_or_falls_with_the_modes():
 def test_what_cannot_act_without_mass_is_refused(acting, sentence):
     with pytest.raises(SystemModelError, match=sentence):
         System.from_reduced(free_bar(4), **acting)
+
+
+def test_joined_dual_components_are_refused():
+    """What they have without mass is negative at the joint."""
+    parts = {name: cms.reduce(two_chains(), modes=5, method="dual-craig-bampton") for name in "ab"}
+    joined = cms.couple(parts, [cms.Joint(("a", "across"), ("b", "across"))])
+    with pytest.raises(SystemModelError, match="negative flexibility without mass"):
+        System.from_reduced(joined, stops=[RigidStop("a.across", 1.0)])
+
+
+def test_the_example_of_the_page_runs(capsys):
+    page = (Path(__file__).parents[3] / "docs/how-to/massless_boundary.md").read_text("utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, flags=re.S)
+    names = {}
+    exec(code, names)
+    said = capsys.readouterr().out.splitlines()
+    beam, reduced = names["beam"], names["reduced"]
+    tip = beam.interfaces["tip"]
+    whole = tip @ np.linalg.solve(beam.stiffness.toarray(), tip)
+    rows = reduced.participation["tip"] / (2.0 * math.pi * reduced.frequencies_hz)
+    assert float(said[0]) == pytest.approx(1.0 / (whole - rows @ rows), rel=1e-5)
+    assert said[1].endswith(", stable>")
 
 
 def test_friction_at_a_rigid_stop_needs_a_point_without_mass():

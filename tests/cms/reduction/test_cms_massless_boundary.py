@@ -1,4 +1,4 @@
-"""A massless boundary: interfaces whose residual flexibility has no mass beside others that have it."""
+"""A massless boundary: residual flexibility without mass at some interfaces alone."""
 
 import numpy as np
 import pytest
