@@ -36,6 +36,8 @@ def check_writable(path: str | Path) -> Path:
             raise OutputError(f"{path}: the folder is read-only")
         with suppress(FileNotFoundError):
             os.lstat(_draft(target))  # its name may be too long
+        with suppress(FileNotFoundError):
+            os.stat(target)  # links may lead in a circle: Python before 3.13 has raised by now
     except OutputError:
         raise
     except (TypeError, ValueError, OSError, RuntimeError) as error:

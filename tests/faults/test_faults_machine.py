@@ -150,6 +150,8 @@ def test_a_home_that_cannot_be_written_to(scene, tmp_path):
     drop = [] if os.getuid() else ["setpriv", "--reuid=65534", "--clear-groups"]
     if drop and shutil.which("setpriv") is None:
         pytest.skip("needs a user that is not root")
+    if subprocess.run([*drop, sys.executable, "-c", ""], capture_output=True).returncode != 0:
+        pytest.skip("that user cannot run Python")
     end = subprocess.run(
         [*drop, sys.executable, "-c", START, "check", str(example("one_dof.toml"))],
         capture_output=True, text=True, timeout=300, env=environment,

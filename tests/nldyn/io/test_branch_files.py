@@ -414,7 +414,7 @@ def test_a_link_to_where_nothing_can_be_written_is_refused_before_any_work(tmp_p
     for place, fault in (
         (tmp_path / "none" / "b.h5", "there is no such folder"),
         (tmp_path / ("b" * 250), "file name too long"),
-        (link, "cannot be the name of a file: .*loop"),
+        (link, "cannot be the name of a file: .*(loop|levels of symbolic links)"),
     ):
         link.unlink(missing_ok=True)
         link.symlink_to(place)
