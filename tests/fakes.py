@@ -23,6 +23,7 @@ class FakeSystem:
     stops: tuple[object, ...] = ()
     areas: dict[str, tuple[int, ...]] = field(default_factory=dict)
     sliders: tuple[object, ...] = ()
+    rubbing: tuple[object, ...] = ()
     frequencies_hz: tuple[float, ...] = ()
 
     def unit(self, interface):

@@ -157,41 +157,6 @@ def _times_of_nodes(motion: Trajectory, panels: NDArray[np.intp]) -> Real:
     return np.asarray(motion.flow.tables.weights[rec.kind[panels]] * rec.duration[panels, None])
 
 
-@dataclass(frozen=True)
-class RoundRub:
-    """How a place rubs along a round clearance, node by node of what the flow map recorded.
-
-    Parameters
-    ----------
-    angle : (k, m)
-        Where it touches, in rad from the first direction to the second.
-    pressed : (k, m)
-        Normal force in N.
-    way : (k, m)
-        How far it slides at the node in m, positive from the first direction to the second.
-    """
-
-    angle: Real
-    pressed: Real
-    way: Real
-
-
-def round_rub(motion: Trajectory, ring: Slider, ends: Real) -> RoundRub:
-    """How a round clearance of `System.rubbing` rubs, by the states at the ends of all pieces."""
-    flow, rec = motion.flow, motion.record
-    stop, rows = flow.system.round_stops[ring.stop], flow.round_rows[ring.stop]
-    panels = _touching(motion, ring.stop)
-    places = []
-    for row, centre in zip(rows, stop.eccentricity, strict=True):
-        at = ends @ flow.rows[row] - centre
-        places.append(np.column_stack([at[panels], rec.depth[panels, row], at[panels + 1]]))
-    x, y = (place[:, 1:-1] for place in places)
-    dx, dy = (_ways_of_nodes(flow, place) for place in places)
-    way = (x * dy - y * dx) / np.hypot(x, y)
-    way -= ring.friction.base_speed * _times_of_nodes(motion, panels)
-    return RoundRub(np.arctan2(y, x), motion.contacts_at_nodes[1][panels, ring.stop], way)
-
-
 def _touching(motion: Trajectory, stop: int) -> NDArray[np.intp]:
     """The panels in which a stop is closed."""
     panels = np.flatnonzero(motion.record.kind >= 0)
@@ -200,19 +165,28 @@ def _touching(motion: Trajectory, stop: int) -> NDArray[np.intp]:
 
 def _round_measures(motion: Trajectory, ring: Slider, ends: Real) -> SliderMeasures:
     """Measures of what slides in a round clearance; it never sticks."""
-    rub, mu = round_rub(motion, ring, ends), ring.friction.coefficient
-    time = float(motion.record.duration.sum())
-    slid = float(motion.record.duration[_touching(motion, ring.stop)].sum()) / time
-    forces = rub.pressed @ fine_table(motion.flow.tables.nodes.size).T
-    pressed_distance = float((rub.pressed * np.abs(rub.way)).sum())
+    flow, rec, mu = motion.flow, motion.record, ring.friction.coefficient
+    stop, panels = flow.system.round_stops[ring.stop], _touching(motion, ring.stop)
+    places = []
+    for row, centre in zip(flow.round_rows[ring.stop], stop.eccentricity, strict=True):
+        at = ends @ flow.rows[row] - centre
+        places.append(np.column_stack([at[panels], rec.depth[panels, row], at[panels + 1]]))
+    x, y = (place[:, 1:-1] for place in places)
+    dx, dy = (_ways_of_nodes(flow, place) for place in places)
+    way = (x * dy - y * dx) / np.hypot(x, y)
+    way = np.abs(way - ring.friction.base_speed * _times_of_nodes(motion, panels))
+    pressed = motion.contacts_at_nodes[1][panels, ring.stop]
+    forces = np.abs(pressed @ fine_table(flow.tables.nodes.size).T)
+    time, slid = float(rec.duration.sum()), float(rec.duration[panels].sum())
+    pressed_distance = float((pressed * way).sum())
     return SliderMeasures(
         ring,
         False,
-        mu * float(peaks(np.abs(forces)).max(initial=0.0)),
-        float(np.abs(rub.way).sum()),
+        mu * float(peaks(forces).max(initial=0.0)),
+        float(way.sum()),
         0.0,
-        slid,
-        1.0 - slid,
+        slid / time,
+        1.0 - slid / time,
         mu * pressed_distance,
         pressed_distance,
         mu * pressed_distance / time,

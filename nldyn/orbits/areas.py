@@ -25,8 +25,9 @@ class AreaMeasures:
         Share of the area, by the weights of the points, that touches at some time.
     closed : float
         Share of area and time that is closed.
-    pressure : (k,)
-        Largest pressure at each point: force by its weight, in N/m² or N/m; N node by node.
+    pressure, mean_pressure : (k,)
+        Largest and mean pressure at each point: force by its weight, in N/m² or N/m; N node by
+        node.
     points : tuple of str
         Interfaces of the points.
 
@@ -47,6 +48,7 @@ class AreaMeasures:
     touched: float
     closed: float
     pressure: Real
+    mean_pressure: Real
     points: tuple[str, ...]
 
     def __repr__(self) -> str:
@@ -68,5 +70,6 @@ def area_measures(name: str, stops: Sequence[Stop], force: Real) -> AreaMeasures
         float(weights @ np.any(force > 0.0, axis=0) / weights.sum()),
         float((np.mean(force > 0.0, axis=0) @ weights) / weights.sum()),
         force.max(axis=0) / weights,
+        force.mean(axis=0) / weights,
         tuple(stop.at for stop in stops),
     )

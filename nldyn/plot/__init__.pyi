@@ -1,6 +1,9 @@
 """Pictures of results with matplotlib."""
 
 from nldyn.plot.basin_shares import plot_basins_over as plot_basins_over
+from nldyn.plot.contact import plot_friction_loss as plot_friction_loss
+from nldyn.plot.contact import plot_pressure as plot_pressure
+from nldyn.plot.contact import plot_wear_around as plot_wear_around
 from nldyn.plot.curves import plot_curves as plot_curves
 from nldyn.plot.diagram import plot_diagram as plot_diagram
 from nldyn.plot.longterm import plot_basins as plot_basins

@@ -430,7 +430,7 @@ def new_axes(width: float = 10.5, height: float = 5.5) -> Axes:
 
 def file_axes(width: float = 10.5, height: float = 5.5) -> Axes:
     """Make the axes of a figure for a file, in inches, that is shown nowhere."""
-    return _hidden_figure(width, height).add_subplot()
+    return file_figure(width, height).add_subplot()
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -439,12 +439,13 @@ def new_figure(width: float, height: float) -> Figure:
     if pyplot is None and in_notebook():
         pyplot = importlib.import_module("matplotlib.pyplot")
     if pyplot is None:
-        return _hidden_figure(width, height)
+        return file_figure(width, height)
     figure: Figure = pyplot.figure(figsize=(width, height), layout="constrained")
     return figure
 
 
-def _hidden_figure(width: float, height: float) -> Figure:
+def file_figure(width: float, height: float) -> Figure:
+    """Make a figure for a file, in inches, that is shown nowhere."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure

@@ -25,6 +25,7 @@ from nldyn.plot.diagram import (
     stop_places,
 )
 from nldyn.plot.words import Along, axis_unit, direction_of, displacement_of, units_of
+from nldyn.report.contact import contact_figure, png_of
 from nldyn.report.deflection import surface_content
 from nldyn.report.offline import Table, as_table, versions, write_html
 from nldyn.report.orbit_content import (
@@ -153,6 +154,7 @@ def write_page(
         "stops": stops_of(branches[0].points[0]) if branches else NO_STOPS,
         "friction": friction_columns(branches[0].points[0]) if branches else [],
         "orbits": orbits,
+        "contact": png_of(contact_figure(diagram, scene)),
         "tables": {
             "special points": special_table(tables["special_points"], along, factor, unit),
             "branches": branch_table(branches, tables, along),

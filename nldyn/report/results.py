@@ -21,8 +21,9 @@ from nldyn.branches.cascades import cascades_in
 from nldyn.branches.endings import Ending
 from nldyn.branches.tables import at_known, friction_names, orbit_columns, size_names
 from nldyn.io.store import save
-from nldyn.plot.diagram import save_diagram
+from nldyn.plot.diagram import save_diagram, save_figure
 from nldyn.report.answer import answer_lines
+from nldyn.report.contact import contact_figure
 from nldyn.report.offline import Table
 from nldyn.report.page import write_page
 from nldyn.runtime.result_directory import result_directory
@@ -103,7 +104,8 @@ def write_results(
         New, empty, or written by an earlier run, whose files are replaced; other files in it
         are kept. Gets ``branches.csv``, ``special_points.csv``, ``ends.csv``, ``branches.h5``,
         ``diagram.png``, ``diagram.svg``, ``summary.json``, ``report.html``, with an exploration
-        ``coverage.csv`` and, with a scene, ``scene.toml``.
+        ``coverage.csv``, with areas of contact or friction ``contact.png`` and ``contact.svg`` and,
+        with a scene, ``scene.toml``.
     scene : Scene, optional
         The scene it was computed from; its text is copied.
     drawn : Drawn, optional
@@ -145,6 +147,9 @@ def write_results(
         title = scene.title if scene else ""
         direction = scene.direction_at(diagram.observe) if scene else ""
         save_diagram(diagram, folder, title=title, direction=direction, yscale=yscale)
+        pressed = contact_figure(diagram, scene)
+        if pressed is not None:
+            save_figure(pressed.axes[0], folder / "contact")
         answer = answer_lines(diagram, tables["special_points"])
         told = {**summary(diagram), "answer": answer}
         text = json.dumps(told, indent=1, allow_nan=False)

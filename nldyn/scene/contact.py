@@ -43,6 +43,8 @@ class Found:
         Where the points are in the mesh, in m.
     held : int
         How many more points supports hold.
+    measure : {"area", "length", "node"}, optional
+        What the weights are: m², m, or nothing.
     """
 
     sides: Sequence[Sequence[str] | None]
@@ -50,6 +52,7 @@ class Found:
     gaps: Real | float
     places: Real | None = None
     held: int = 0
+    measure: str | None = None
 
 
 def with_areas(scene: Scene, component: fem.Component) -> fem.Component:
@@ -133,7 +136,8 @@ def _placed(component: fem.Component, table: MeshAreaTable) -> tuple[Found, dict
         for name, row in zip(names, rows, strict=True)
     }
     gaps = _gaps(table, points.places)
-    return Found(sides, points.weights, gaps, points.places, points.held), named
+    found = Found(sides, points.weights, gaps, points.places, points.held, points.measure)
+    return found, named
 
 
 def _axis(given: str | Sequence[float]) -> str | list[float]:

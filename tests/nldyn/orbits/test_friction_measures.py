@@ -157,6 +157,7 @@ def test_the_report_has_a_row_for_each_slider_and_columns_over_the_branch(
     assert [float(row["stuck_share"]) for row in rows] == [o.friction[0].stuck for o in orbits]
     content = unpacked((folder / "report.html").read_text(encoding="utf-8"))
     assert content["friction"][:3] == ["slider", "largest friction (N)", "distance (m)"]
+    assert (folder / "contact.png").is_file() and content["contact"]
     for shown in content["orbits"]:
         (row,) = shown["friction"]
         told = dict(zip(content["friction"], row, strict=True))
