@@ -11,6 +11,7 @@ import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -27,6 +28,7 @@ from nldyn.app.describe import (
 )
 from nldyn.app.options import (
     any_path,
+    count_option,
     drawn_modes_option,
     frequency_option,
     jobs_option,
@@ -254,16 +256,7 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
     with plain_errors():
         from nldyn.base.errors import SystemModelError
         from nldyn.runtime.progress import messages_shown
-        from nldyn.scene.build import (
-            build_any,
-            build_candidates,
-            build_parts,
-            build_reduced,
-            build_system,
-            doubts_until_modes,
-            join,
-            tell_mesh_errors,
-        )
+        from nldyn.scene.build import build_structure, build_system
         from nldyn.scene.checks import (
             check_computable,
             check_held_to_follow,
@@ -276,19 +269,9 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
 
         loaded = load_scene(scene, mesh_folders)
         with messages_shown():
-            reduced = candidates = None
-            with doubts_until_modes() as doubts:
-                component = None if loaded.reduction is None else build_any(loaded)
-                if loaded.reduction is not None and loaded.reduction.tolerance is not None:
-                    candidates = build_candidates(loaded, component)
-                    reduced = candidates.reduced()
-                elif component is not None:
-                    reduced = build_reduced(loaded, component)
-                if reduced is not None and tell_mesh_errors(component, reduced):
-                    doubts.clear()
-            parts = {"": component} if component is not None else build_parts(loaded)
-            if loaded.components:
-                reduced = join(loaded, parts)
+            structure = build_structure(loaded, chosen=False)
+            component, reduced = structure.component, structure.reduced
+            parts = structure.parts if component is None else {"": component}
             system = build_system(loaded, reduced)
             with told_as(loaded, (), SystemModelError):
                 at_rest = describe_rest(system)
@@ -302,10 +285,9 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
 
         if as_json:
             from nldyn.report.modes import mode_table
-            from nldyn.scene.build import Structure
 
             check_run()
-            table = mode_table(loaded, Structure(component, reduced))
+            table = mode_table(loaded, structure)
             count = sum(part.mass.shape[0] for part in parts.values()) or None
             click.echo(json_text({
                 "scene": str(scene),
@@ -322,10 +304,10 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
         described = describe_system(system, 0 if reduced is None else reduced.residual_modes)
         click.echo("\n".join([described, *at_rest]))
         check_run()
-        if candidates is not None and loaded.reduction is not None:
+        if structure.candidates is not None and loaded.reduction is not None:
             click.echo(
-                f"modes up to {candidates.cutoff_hz:.4g} Hz may matter; of these, 'nldyn run' "
-                f"keeps as many as tolerance = {loaded.reduction.tolerance:g} needs"
+                f"modes up to {structure.candidates.cutoff_hz:.4g} Hz may matter; of these, "
+                f"'nldyn run' keeps as many as tolerance = {loaded.reduction.tolerance:g} needs"
             )
         for remark in remarks(loaded, system):
             click.echo(f"note: {remark}")
@@ -460,14 +442,8 @@ def open_page(page: Path) -> None:
 
 
 @main.command()
-@writes_results()
-@click.option(
-    "--mode",
-    type=click.IntRange(1, 100_000),
-    default=1,
-    show_default=True,
-    help="Linear mode at which the family begins.",
-)
+@writes_results("backbone")
+@count_option("--mode", 1, 100_000, 1, "Linear mode at which the family begins.", None)
 @click.option(
     "--amplitude-m",
     type=click.FloatRange(1e-30, 1e30),
@@ -496,8 +472,9 @@ def backbone(
 
     found = backbone_of(work.scene, amplitude_m, mode)
     resonant = phase_resonance_of(work.scene, found) if forced else None
-    write_backbone(found, work.out, work.scene.text, work.scene.title, resonant)
-    return Told([*_shown(found, resonant), written_by(work.out, "backbone")])
+    title = work.scene.title
+    write = partial(write_backbone, found, title=title, forced=resonant)
+    return Told(_shown(found, resonant), write=write)
 
 
 def one_frequency_or_run_up(
@@ -511,22 +488,13 @@ def one_frequency_or_run_up(
 
 
 @main.command()
-@writes_results(check=one_frequency_or_run_up)
+@writes_results("simulation", check=one_frequency_or_run_up)
 @frequency_option("Excitation frequency, at which a run-up begins.")
-@click.option(
-    "--periods",
-    type=click.IntRange(1, 100_000),
-    metavar="N",
-    help="Excitation periods to record; 100 unless given.",
-)
-@click.option(
-    "--transient",
-    type=click.IntRange(0, 100_000_000),
-    default=0,
-    show_default=True,
-    metavar="N",
-    help="Excitation periods before the recording, or before the run-up.",
-)
+@count_option("--periods", 1, 100_000, None, "Excitation periods to record; 100 unless given.")
+@count_option(
+    "--transient", 0, 100_000_000, 0,
+    "Excitation periods before the recording, or before the run-up.",
+)  # fmt: skip
 @click.option(
     "--to-hz",
     type=click.FloatRange(1e-6, 1e12),
@@ -561,7 +529,7 @@ def simulate(
     from nldyn.report.simulation import write_simulation
     from nldyn.scene.simulation import simulation_of
 
-    scene, out = work.scene, work.out
+    scene = work.scene
     found = simulation_of(
         scene, frequency_hz, periods=periods or 100, transient=transient, exponents=exponents,
         to_hz=to_hz, rate_hz_per_s=rate_hz_per_s or 0.0,
@@ -569,28 +537,20 @@ def simulate(
     )  # fmt: skip
     hits = impacts(found.motion)
     along = scene.direction_at(found.motion.system.interfaces[0])
-    write_simulation(found.motion, hits, out, scene.text, scene.title, along)
-    return Told([*_shown(found.motion, hits, found.spectrum), written_by(out, "simulation")])
+    write = partial(write_simulation, found.motion, hits, title=scene.title, direction=along)
+    return Told(_shown(found.motion, hits, found.spectrum), write=write)
 
 
 @main.command()
-@writes_results()
-@click.option(
-    "--points",
-    type=click.IntRange(2, 1_000_000),
-    default=100,
-    show_default=True,
-    metavar="N",
-    help="Values of what [continuation] changes, equally spaced over its range.",
-)
-@click.option(
-    "--starts",
-    type=click.IntRange(0, 1_000_000),
-    default=0,
-    show_default=True,
-    metavar="N",
-    help="Random initial states at each value, beside the attractor of the value before.",
-)
+@writes_results("sweep")
+@count_option(
+    "--points", 2, 1_000_000, 100,
+    "Values of what [continuation] changes, equally spaced over its range.",
+)  # fmt: skip
+@count_option(
+    "--starts", 0, 1_000_000, 0,
+    "Random initial states at each value, beside the attractor of the value before.",
+)  # fmt: skip
 @jobs_option
 def sweep(work: Work, points: int, starts: int, jobs: int) -> Told:
     """Simulate what motions of a scene settle on, up and down the range of its [continuation].
@@ -601,12 +561,9 @@ def sweep(work: Work, points: int, starts: int, jobs: int) -> Told:
     from nldyn.report.sweep import write_sweep
     from nldyn.scene.sweep import sweep_of
 
-    scene, out = work.scene, work.out
-    found = sweep_of(
-        scene, points=points, starts=starts, progress=work.line.counted("sweeps"), jobs=jobs
-    )
-    write_sweep(found, out, scene.text, scene.title)
-    return Told([*_shown(found), written_by(out, "sweep")])
+    progress = work.line.counted("sweeps")
+    found = sweep_of(work.scene, points=points, starts=starts, progress=progress, jobs=jobs)
+    return Told(_shown(found), write=partial(write_sweep, found, title=work.scene.title))
 
 
 def one_frequency_or_several_values(frequency_hz: float | None, over: int | None, **_: Any) -> None:
@@ -616,14 +573,12 @@ def one_frequency_or_several_values(frequency_hz: float | None, over: int | None
 
 
 @main.command()
-@writes_results(check=one_frequency_or_several_values)
+@writes_results("basins", check=one_frequency_or_several_values)
 @frequency_option("Excitation frequency.", required=False)
-@click.option(
-    "--over",
-    type=click.IntRange(2, 10_000),
-    metavar="N",
-    help="Instead: N values of what [continuation] changes, equally spaced over its range.",
-)
+@count_option(
+    "--over", 2, 10_000, None,
+    "Instead: N values of what [continuation] changes, equally spaced over its range.",
+)  # fmt: skip
 @click.option(
     "--x",
     callback=plane_state,
@@ -645,22 +600,11 @@ def one_frequency_or_several_values(frequency_hz: float | None, over: int | None
     help="Its range in m or m/s; by default twice what the attractors do.",
 )
 @click.option("--y-range", nargs=2, type=float, metavar="MIN MAX", help="Likewise.")
-@click.option(
-    "--cells",
-    type=click.IntRange(2, 3000),
-    default=50,
-    show_default=True,
-    metavar="N",
-    help="Initial states along each axis.",
-)
-@click.option(
-    "--longest",
-    type=click.IntRange(64, 10_000_000),
-    default=2000,
-    show_default=True,
-    metavar="N",
-    help="Excitation periods after which a motion counts as undecided.",
-)
+@count_option("--cells", 2, 3000, 50, "Initial states along each axis.")
+@count_option(
+    "--longest", 64, 10_000_000, 2000,
+    "Excitation periods after which a motion counts as undecided.",
+)  # fmt: skip
 @jobs_option
 def basins(
     work: Work,
@@ -685,7 +629,7 @@ def basins(
     from nldyn.scene.basins import basins_of
     from nldyn.scene.messages import unknown_name
 
-    scene, out = work.scene, work.out
+    scene = work.scene
     for option, state in (("--x", x), ("--y", y)):
         if state is not None and state[1] not in scene.interface_names:
             fault = unknown_name(state[1], scene.interface_names, "an interface")
@@ -694,8 +638,8 @@ def basins(
         scene, frequency_hz, over=over or 1, x=x, y=y, x_range=x_range, y_range=y_range,
         cells=cells, longest=longest, progress=work.line, jobs=jobs,
     )  # fmt: skip
-    write_basins(found, out, scene.text, scene.title)
-    return Told([*_shown(found), found.report(), written_by(out, "basins")])
+    write = partial(write_basins, found, title=scene.title)
+    return Told([*_shown(found), found.report()], write=write)
 
 
 def _shown(*found: object) -> list[str]:
@@ -716,13 +660,7 @@ def period_of_an_orbit(period: int, frequency_hz: float | None, **_: Any) -> Non
 @frequency_option(
     "Draw the orbit at this excitation frequency; else the highest harmonic one.", required=False
 )
-@click.option(
-    "--period",
-    type=click.IntRange(1, 100),
-    default=1,
-    show_default=True,
-    help="Period of that orbit, in periods of the excitation.",
-)
+@count_option("--period", 1, 100, 1, "Period of that orbit, in periods of the excitation.", None)
 @click.option(
     "--video",
     type=click.Choice(["gif", "mp4"]),
@@ -767,7 +705,7 @@ def render(
 
 
 @main.command()
-@writes_results()
+@writes_results("converge")
 @click.option(
     "--modes",
     callback=number_list,
@@ -825,15 +763,13 @@ def converge(
     from nldyn.report.convergence import write_study
     from nldyn.scene.convergence import convergence_study_of
 
-    scene, out = work.scene, work.out
     study = convergence_study_of(
-        scene, modes=modes, methods=_names(methods), refinements=refinements or [1],
+        work.scene, modes=modes, methods=_names(methods), refinements=refinements or [1],
         meshes=_names(meshes), components=_names(components), at=at, full=full,
         progress=work.line, jobs=jobs,
     )  # fmt: skip
-    write_study(study, out, scene.title, scene.text)
-    page = out / "convergence.html"
-    return Told([study.report(), f"written to {out}; {page} is a page for a browser"])
+    write = partial(write_study, study, title=work.scene.title, text=work.scene.text)
+    return Told([study.report()], write=write)
 
 
 def _names(text: str | None) -> list[str]:

@@ -53,6 +53,16 @@ jobs_option = click.option(
 )
 
 
+def count_option(
+    name: str, least: int, most: int, default: int | None, help: str, metavar: str | None = "N"
+) -> Callable[[Any], Any]:
+    """An option that is a whole number."""
+    return click.option(
+        name, type=click.IntRange(least, most), default=default, metavar=metavar,
+        show_default=default is not None, help=help,
+    )  # fmt: skip
+
+
 def number_list(
     _context: click.Context, _parameter: click.Parameter, value: str | None
 ) -> list[int] | None:

@@ -71,20 +71,26 @@ class Work:
 
 @dataclass(frozen=True)
 class Told:
-    """What a command says in the end: lines, and a fault with its exit code, if there is one."""
+    """What a command says in the end: lines, and a fault with its exit code, if there is one.
+
+    Its results are written into a folder by `write` unless they are written already.
+    """
 
     lines: Iterable[str]
     fault: str = ""
     code: int = 0
+    write: Callable[[Path], object] | None = None
 
 
 def writes_results(
-    *, kept: bool = False, check: Callable[..., None] | None = None
+    kind: str = "", *, kept: bool = False, check: Callable[..., None] | None = None
 ) -> Callable[[Callable[..., Told]], Callable[..., None]]:
     """Make a command of a function of `Work` and of the options that are its own.
 
     Parameters
     ----------
+    kind : str
+        What `Told.write` writes: files of this kind that were there before are replaced.
     kept : bool
         Whether what is computed is kept if it does not reach the end.
     check : callable, optional
@@ -114,7 +120,8 @@ def writes_results(
                 keeping = kept_at_interrupt(out) if kept else nullcontext()
                 with keeping as unfinished, progress_line(quiet) as line:
                     told = work_of(Work(loaded, out, replace, line, unfinished, start), **own)
-            click.echo("\n".join(told.lines))
+                    lines = [*told.lines, *_written(told, out, kind, loaded.text)]
+            click.echo("\n".join(lines))
             if told.fault:
                 click.echo(f"nldyn: {told.fault}", err=True)
                 sys.exit(told.code)
@@ -122,6 +129,18 @@ def writes_results(
         return command
 
     return decorated
+
+
+def _written(told: Told, out: Path, kind: str, text: str) -> list[str]:
+    """Write what is still to be written, with the text of the scene, and tell the files."""
+    from nldyn.runtime.result_directory import SCENE, result_directory
+
+    if told.write is None:
+        return []
+    with result_directory(out, kind) as folder:
+        told.write(folder)
+        (folder / SCENE).write_text(text, encoding="utf-8")
+    return [written_by(out, kind)]
 
 
 def written_by(out: Path, kind: str) -> str:

@@ -46,13 +46,15 @@ def answer_lines(diagram: Diagram, special_points: Table) -> list[str]:
     largest = max(map(abs, diagram.limits))
     along = Along.of(diagram.parameter, largest, nodes[0].orbit.system)
     stable = joined(stable_ranges(diagram.branches), diagram.limits)
+    between = gaps(stable, diagram.limits)
+    unstable = _listed(between, along) if between else "none"
     return [
         _peak_line(nodes, along, diagram.observe),
         *_contact_lines(nodes, along),
         *_area_lines(nodes, along),
         *_friction_lines(nodes, along),
         f"stable and periodic: {_listed(stable, along)}",
-        f"nothing stable was found: {_listed(gaps(stable, diagram.limits), along)}",
+        f"ranges where nothing stable was found: {unstable}",
         f"jumps: {jumps_line(diagram.branches, special_points, along)}",
     ]
 

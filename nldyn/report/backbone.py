@@ -12,26 +12,16 @@ from nldyn.curves.curves import Curve
 from nldyn.plot.diagram import PERIOD_COLOURS, file_axes, save_figure
 from nldyn.plot.words import unit_in
 from nldyn.report.results import write_table
-from nldyn.runtime.result_directory import result_directory
 
 COLUMNS = ("frequency_hz", "energy_j", "amplitude_{unit}", "impacts", "stable", "error")
 
 
 def write_backbone(
-    found: Backbone,
-    directory: str | Path,
-    text: str,
-    title: str = "",
-    forced: Curve | None = None,
-) -> Path:
-    """Write ``backbone.csv``, ``backbone.png`` and ``.svg``, and the text of the scene.
+    found: Backbone, folder: Path, title: str = "", forced: Curve | None = None
+) -> None:
+    """Write ``backbone.csv``, ``backbone.png`` and ``.svg``.
 
     With the forced curve of phase resonance also ``phase_resonance.csv``.
-
-    Raises
-    ------
-    OutputError
-        If the directory holds only other people's files or cannot be written.
     """
     rows = zip(
         found.frequency_hz.tolist(),
@@ -42,18 +32,15 @@ def write_backbone(
         [orbit.error for orbit in found.orbits],
         strict=True,
     )
-    with result_directory(directory, "backbone") as folder:
-        names = [name.format(unit=measure_of(found)) for name in COLUMNS]
-        write_table(folder / "backbone.csv", names, rows)
-        ax = plot_backbone(found, title)
-        if forced is not None:
-            table = forced.table()
-            rows = zip(*(table[name].tolist() for name in table), strict=True)
-            write_table(folder / "phase_resonance.csv", tuple(table), rows)
-            draw_forced(ax, forced, found)
-        save_figure(ax, folder / "backbone")
-        (folder / "scene.toml").write_text(text, encoding="utf-8")
-    return Path(directory)
+    names = [name.format(unit=measure_of(found)) for name in COLUMNS]
+    write_table(folder / "backbone.csv", names, rows)
+    ax = plot_backbone(found, title)
+    if forced is not None:
+        table = forced.table()
+        rows = zip(*(table[name].tolist() for name in table), strict=True)
+        write_table(folder / "phase_resonance.csv", tuple(table), rows)
+        draw_forced(ax, forced, found)
+    save_figure(ax, folder / "backbone")
 
 
 def measure_of(found: Backbone) -> str:

@@ -12,7 +12,6 @@ from nldyn.plot.basin_shares import plot_basins_over
 from nldyn.plot.diagram import file_axes, save_figure
 from nldyn.plot.longterm import plot_basins
 from nldyn.report.results import if_known, write_table
-from nldyn.runtime.result_directory import result_directory
 
 Located = tuple[tuple[float, ...], Basins]  # with the value of a parameter, if one changes
 COLUMNS = (
@@ -22,38 +21,28 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def write_basins(
-    found: Basins | BasinsOver, directory: str | Path, text: str, title: str = ""
-) -> Path:
-    """Write ``attractors.csv``, ``basins.csv``, ``basins.png`` and ``.svg``, and the scene.
+def write_basins(found: Basins | BasinsOver, folder: Path, title: str = "") -> None:
+    """Write ``attractors.csv``, ``basins.csv``, ``basins.png`` and ``.svg``.
 
     Over a parameter the tables begin with its value, and the picture shows the shares.
-
-    Raises
-    ------
-    OutputError
-        If the directory holds only other people's files or cannot be written.
     """
-    with result_directory(directory, "basins") as folder:
-        first: list[str] = []
-        maps: list[Located] = []
-        if isinstance(found, BasinsOver):
-            first = [found.column]
-            maps = [((v,), each) for v, each in zip(found.values, found.maps, strict=True)]
-            ax = plot_basins_over(found, file_axes())
-        else:
-            maps = [((), found)]
-            ax = plot_basins(found, file_axes(7.0, 5.5))
-        _, one = maps[0]
-        names = [*first, *(name.format(unit=one.unit) for name in COLUMNS)]
-        write_table(folder / "attractors.csv", names, _rows_at(maps, attractor_rows))
-        columns = (*first, one.plane.x_label, one.plane.y_label, "attractor", "phase", "periods")
-        write_table(folder / "basins.csv", columns, _rows_at(maps, cell_rows))
-        if title:
-            ax.set_title(f"{title}\n{ax.get_title()}")
-        save_figure(ax, folder / "basins")
-        (folder / "scene.toml").write_text(text, encoding="utf-8")
-    return Path(directory)
+    first: list[str] = []
+    maps: list[Located] = []
+    if isinstance(found, BasinsOver):
+        first = [found.column]
+        maps = [((v,), each) for v, each in zip(found.values, found.maps, strict=True)]
+        ax = plot_basins_over(found, file_axes())
+    else:
+        maps = [((), found)]
+        ax = plot_basins(found, file_axes(7.0, 5.5))
+    _, one = maps[0]
+    names = [*first, *(name.format(unit=one.unit) for name in COLUMNS)]
+    write_table(folder / "attractors.csv", names, _rows_at(maps, attractor_rows))
+    columns = (*first, one.plane.x_label, one.plane.y_label, "attractor", "phase", "periods")
+    write_table(folder / "basins.csv", columns, _rows_at(maps, cell_rows))
+    if title:
+        ax.set_title(f"{title}\n{ax.get_title()}")
+    save_figure(ax, folder / "basins")
 
 
 def _rows_at(

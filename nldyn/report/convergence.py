@@ -18,41 +18,29 @@ from nldyn.report.convergence_page import along_of, special, study_content
 from nldyn.report.convergence_tables import study_tables
 from nldyn.report.offline import write_html
 from nldyn.report.results import write_table
-from nldyn.runtime.result_directory import result_directory
 
 SMALLEST = 1e-14
 
 Series = Mapping[str, Sequence[int]]
 
 
-def write_study(
-    study: ConvergenceStudy, directory: str | Path, title: str = "", text: str = ""
-) -> Path:
+def write_study(study: ConvergenceStudy, folder: Path, title: str = "", text: str = "") -> None:
     """Write ``convergence.html``, a page for a browser, tables, ``report.txt`` and pictures.
 
-    With the text of the scene also ``scene.toml``.
-
-    Raises
-    ------
-    OutputError
-        If the directory holds only other people's files or cannot be written.
+    The page shows the text of the scene.
     """
-    with result_directory(directory, "converge") as folder:
-        tables = study_tables(study)
-        write_table(folder / "convergence.csv", *tables["models"])
-        write_table(folder / "special_points_by_model.csv", *tables["folds and flips"])
-        content = study_content(study, tables, title, text)
-        write_html(folder / "convergence.html", "convergence.html", content)
-        if text:
-            (folder / "scene.toml").write_text(text, encoding="utf-8")
-        (folder / "report.txt").write_text(study.report() + "\n", encoding="utf-8")
-        if counts_vary(study):
-            save_figure(plot_errors(study, title), folder / "convergence")
-        save_figure(plot_cost(study, title), folder / "speed_against_error")
-        save_figure(plot_special_points(study, title), folder / "special_points_by_model")
-        if study.mesh_series():
-            save_figure(plot_errors_by_mesh(study, title), folder / "meshes")
-    return Path(directory)
+    tables = study_tables(study)
+    write_table(folder / "convergence.csv", *tables["models"])
+    write_table(folder / "special_points_by_model.csv", *tables["folds and flips"])
+    content = study_content(study, tables, title, text)
+    write_html(folder / "convergence.html", "convergence.html", content)
+    (folder / "report.txt").write_text(study.report() + "\n", encoding="utf-8")
+    if counts_vary(study):
+        save_figure(plot_errors(study, title), folder / "convergence")
+    save_figure(plot_cost(study, title), folder / "speed_against_error")
+    save_figure(plot_special_points(study, title), folder / "special_points_by_model")
+    if study.mesh_series():
+        save_figure(plot_errors_by_mesh(study, title), folder / "meshes")
 
 
 def counts_vary(study: ConvergenceStudy) -> bool:

@@ -301,10 +301,12 @@ def limits(
     special = sum(len(branch.special_points) for branch in diagram.branches)
     points = sum(len(branch.points) for branch in diagram.branches)
     shown = sum(each.special >= 0 for each in chosen)
-    said = [
-        f"{len(chosen)} orbits can be looked at: those of {shown} of {special} special points and "
-        f"of {len(chosen) - shown} of {points} points, evenly spaced (the dots)."
-    ]
+    spread = len(chosen) - shown
+    dots = f"all {points} points"
+    if spread < points:
+        dots = f"{spread} of {points} points, evenly spaced"
+    marks = f"{shown} of {special} special points and of " if special else ""
+    said = [f"{len(chosen)} orbits can be looked at: those of {marks}{dots} (the dots)."]
     if shown < special:
         said.append(
             "Of special points those beside a stable orbit come first, evenly spaced ones of the "

@@ -20,7 +20,6 @@ from nldyn.plot.diagram import PERIOD_COLOURS, file_axes, save_figure
 from nldyn.plot.longterm import plot_sweep
 from nldyn.plot.words import axis_unit, displacement_of, units_of
 from nldyn.report.results import write_table
-from nldyn.runtime.result_directory import result_directory
 
 PER_PERIOD = 64  # rows of the table in an excitation period
 DRAWN = 20_000  # points that a picture shows one by one
@@ -29,45 +28,32 @@ AT_ONCE = 8192  # rows that are held at once
 
 
 def write_simulation(
-    motion: Motion,
-    hits: Impacts,
-    directory: str | Path,
-    text: str,
-    title: str = "",
-    direction: str = "",
-) -> Path:
-    """Write ``motion.csv``, ``impacts.csv``, ``simulation.png`` and ``.svg``, and the scene.
+    motion: Motion, hits: Impacts, folder: Path, title: str = "", direction: str = ""
+) -> None:
+    """Write ``motion.csv``, ``impacts.csv``, ``simulation.png`` and ``.svg``.
 
     Of a run-up also ``peaks.csv``, the largest displacement in each excitation period.
-
-    Raises
-    ------
-    OutputError
-        If the directory holds only other people's files or cannot be written.
     """
     observed = check_observe(motion.system, None)
     hz, peaks = motion.period_peaks(observed)
     samples = PER_PERIOD * max(hz.size, 1)
     curve = Drawn(observed, math.ceil(samples / BARS) if samples > DRAWN else 1)
-    with result_directory(directory, "simulation") as folder:
-        pieces = motion.histories(samples, curve.each * max(AT_ONCE // curve.each, 1))
-        write_pieces(map(curve.seen, pieces), folder / "motion.csv")
-        columns = {**hits.columns(), "rotation": hits.rotation.astype(int)}
-        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-        write_table(folder / "impacts.csv", columns, rows)
-        if motion.rate_hz_per_s:
-            rows = zip(hz.tolist(), peaks.tolist(), strict=True)
-            size = displacement_name(motion.system, observed)
-            write_table(folder / "peaks.csv", ("frequency_hz", size), rows)
-        ax = (
-            plot_sweep(motion, direction=direction)
-            if motion.rate_hz_per_s
-            else plot_motion(curve, direction)
-        )
-        ax.set_title(title or "Simulation")
-        save_figure(ax, folder / "simulation")
-        (folder / "scene.toml").write_text(text, encoding="utf-8")
-    return Path(directory)
+    pieces = motion.histories(samples, curve.each * max(AT_ONCE // curve.each, 1))
+    write_pieces(map(curve.seen, pieces), folder / "motion.csv")
+    columns = {**hits.columns(), "rotation": hits.rotation.astype(int)}
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    write_table(folder / "impacts.csv", columns, rows)
+    if motion.rate_hz_per_s:
+        rows = zip(hz.tolist(), peaks.tolist(), strict=True)
+        size = displacement_name(motion.system, observed)
+        write_table(folder / "peaks.csv", ("frequency_hz", size), rows)
+    ax = (
+        plot_sweep(motion, direction=direction)
+        if motion.rate_hz_per_s
+        else plot_motion(curve, direction)
+    )
+    ax.set_title(title or "Simulation")
+    save_figure(ax, folder / "simulation")
 
 
 @dataclass

@@ -11,30 +11,20 @@ from nldyn.longterm.poincare import BruteForce
 from nldyn.plot.diagram import file_axes, save_figure
 from nldyn.plot.longterm import plot_brute_force
 from nldyn.report.results import if_known, write_table
-from nldyn.runtime.result_directory import result_directory
 from nldyn.system.chart import parameter_name
 
 
-def write_sweep(found: BruteForce, directory: str | Path, text: str, title: str = "") -> Path:
-    """Write ``sweep.csv``, ``sweep.png`` and ``.svg``, and the scene.
-
-    Raises
-    ------
-    OutputError
-        If the directory holds only other people's files or cannot be written.
-    """
+def write_sweep(found: BruteForce, folder: Path, title: str = "") -> None:
+    """Write ``sweep.csv``, ``sweep.png`` and ``.svg``."""
     system = found.columns[0].attractor.flow.system
     columns = (
         parameter_name(found.parameter), "direction", "attractor", "period", "impacts_per_period",
         displacement_name(system, found.observe), "largest_exponent_per_s",
     )  # fmt: skip
-    with result_directory(directory, "sweep") as folder:
-        write_table(folder / "sweep.csv", columns, sweep_rows(found))
-        ax = plot_brute_force(found, file_axes())
-        ax.set_title(title or "Sweep")
-        save_figure(ax, folder / "sweep")
-        (folder / "scene.toml").write_text(text, encoding="utf-8")
-    return Path(directory)
+    write_table(folder / "sweep.csv", columns, sweep_rows(found))
+    ax = plot_brute_force(found, file_axes())
+    ax.set_title(title or "Sweep")
+    save_figure(ax, folder / "sweep")
 
 
 def sweep_rows(found: BruteForce) -> Iterator[tuple[object, ...]]:

@@ -7,7 +7,6 @@ from concurrent.futures import Executor
 
 from nldyn.base.errors import SystemModelError
 from nldyn.flow.flow_map import FlowMap
-from nldyn.flow.options import FlowOptions
 from nldyn.longterm.attractors import Attractor, find_attractors
 from nldyn.longterm.basin_shares import BasinsOver, values_over
 from nldyn.longterm.basins import MOTION, Basins, PlaneState, StatePlane, basins, check_has_basins
@@ -15,10 +14,9 @@ from nldyn.orbits.axis import Axis
 from nldyn.orbits.orbit import check_observe
 from nldyn.runtime.executors import own_processes
 from nldyn.runtime.progress import Progress, Shares, silent
-from nldyn.scene.build import build_system
+from nldyn.scene.build import build_flow
 from nldyn.scene.faults import told_as
 from nldyn.scene.followed import axis_of
-from nldyn.scene.messages import scene_error
 from nldyn.scene.schema.scene import Scene
 from nldyn.system.system import System
 
@@ -92,11 +90,10 @@ def basins_of(
     1: 100.0 ± 0.5 %, period 1, no impacts, -0.000127 to 0.000127 m at 'tip'
     0 of 40 cells that were simulated once more came to another result
     """
-    table = scene.continuation
-    flow = FlowMap(build_system(scene), FlowOptions(table.rtol) if table else None)
+    flow = build_flow(scene)
     name = first_interface(flow.system)
     x, y = x or ("displacement", name), y or ("velocity", name)
-    axis = None if frequency_hz is not None else _axis_of(scene, flow.system)
+    axis = None if frequency_hz is not None else axis_of(scene, flow.system)
     with told_as(scene, (), SystemModelError), own_processes(jobs) as executor:
         values = [] if axis is None else values_over(flow, axis, over)
         cases = _cases(flow, axis, values, frequency_hz)
@@ -146,14 +143,6 @@ def _attractors(
         for k, (flow, hz) in enumerate(cases)
     ]  # fmt: skip
     return [[share.attractor for share in each if share.attractor.lasting] for each in found]
-
-
-def _axis_of(scene: Scene, system: System) -> Axis:
-    """What the continuation of a scene changes."""
-    if scene.continuation is None:
-        fault = "is missing: it says over which parameter and range basins are computed"
-        raise scene_error(scene.file, ("continuation",), fault)
-    return axis_of(scene, system)
 
 
 def first_interface(system: System) -> str:

@@ -38,6 +38,7 @@ from nldyn.system.spin import Spin
 from nldyn.system.system import Elements, System
 
 if TYPE_CHECKING:
+    from nldyn.flow.flow_map import FlowMap
     from nldyn.reduction.selection import ModeSelection
 
 Given = TypeVar("Given")
@@ -73,22 +74,29 @@ class Structure:
         None where nothing is reduced.
     parts : dict of str to component
         The components of a scene that has several, by name.
+    candidates : Candidates, optional
+        The modes among which a tolerance is to choose, where `reduced` has all of them.
     """
 
     component: AnyComponent | None = None
     reduced: cms.ReducedModel | None = None
     parts: Mapping[str, AnyComponent] = field(default_factory=dict)
+    candidates: Candidates | None = None
 
 
-def build_structure(scene: Scene, progress: Progress | None = None) -> Structure:
+def build_structure(
+    scene: Scene, progress: Progress | None = None, *, chosen: bool = True
+) -> Structure:
     """Build the component of a scene and reduce it, as `build_any` and `build_reduced` do.
+
+    Unless modes are to be chosen by a tolerance, which takes long, all candidates are kept.
 
     Examples
     --------
     >>> from nldyn.base.resources import example
     >>> from nldyn.scene.read import load_scene
     >>> build_structure(load_scene(example("one_dof.toml")))
-    Structure(component=None, reduced=None, parts={})
+    Structure(component=None, reduced=None, parts={}, candidates=None)
     """
     if scene.components:
         parts = build_parts(scene)
@@ -96,11 +104,13 @@ def build_structure(scene: Scene, progress: Progress | None = None) -> Structure
     if scene.reduction is None:
         return Structure()
     with doubts_until_modes() as doubts:
-        component = build_any(scene)
-        reduced = build_reduced(scene, component, progress)
+        component, candidates = build_any(scene), None
+        if scene.reduction.tolerance is not None and not chosen:
+            candidates = build_candidates(scene, component)
+        reduced = candidates.reduced() if candidates else build_reduced(scene, component, progress)
         if tell_mesh_errors(component, reduced):
             doubts.clear()
-    return Structure(component, reduced)
+    return Structure(component, reduced, candidates=candidates)
 
 
 @contextmanager
@@ -245,6 +255,20 @@ def _check_small(scene: Scene, rows: int) -> None:
     if rows > LARGEST_DENSE:
         fault = f"is missing: matrices of {rows} rows, more than {LARGEST_DENSE}, must be reduced"
         raise scene_error(scene.file, ("reduction",), f"{fault}, as by modes = 10")
+
+
+def build_flow(scene: Scene) -> FlowMap:
+    """The flow map of a scene, as exact as its continuation says, if it has one.
+
+    Raises
+    ------
+    SceneError
+        As `build_system`.
+    """
+    from nldyn.flow.flow_map import FlowMap, FlowOptions  # check computes nothing
+
+    table = scene.continuation
+    return FlowMap(build_system(scene), FlowOptions(table.rtol) if table else None)
 
 
 def build_parts(scene: Scene) -> dict[str, AnyComponent]:

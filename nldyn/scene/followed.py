@@ -41,12 +41,14 @@ def axis_of(scene: Scene, system: System) -> Axis:
     Raises
     ------
     SceneError
-        If the system has no such number, or it cannot have these values.
+        If there is no continuation, the system has no such number, or it cannot have these values.
     """
     from nldyn.orbits.axis import Axis  # check computes nothing
 
     table = scene.continuation
-    assert table is not None
+    if table is None:
+        fault = "is missing: it says over which parameter and range"
+        raise scene_error(scene.file, ("continuation",), fault)
     parameter = followed_parameter(scene)
     key = KEY if table.parameter else ("continuation",)
     with told_as(scene, key, SystemModelError):

@@ -129,18 +129,20 @@ def unknown_name(name: str, known: Iterable[str], what: str) -> str:
 def from_validation(file: Path, model: type[BaseModel], error: ValidationError) -> SceneError:
     """Turn pydantic's report into one sentence for each fault, all in a line.
 
-    Unknown keys come first. What else is wrong in their tables may come of them, and is not told.
+    Unknown keys come first. What else is wrong in their tables may come of those that are
+    misspelt, and is not told.
     """
     details = error.errors(include_url=False)
     unknown = [d for d in details if d["type"] == "extra_forbidden"]
-    misspelt = {_own_steps(model, d["loc"][:-1]) for d in unknown}
+    of_no_table = [d["loc"] for d in unknown if not _which_have_it(model, d["loc"])]
+    misspelt = {_own_steps(model, key[:-1]) for key in of_no_table}
     told: dict[KeyPath, str] = {}
     for detail in (*unknown, *details):
         key = _own_steps(model, detail["loc"])
         if detail["type"] == NONE_CHOSEN:
             key = (*key, str(detail["ctx"]["key"]))
         if detail["type"] == "extra_forbidden" or key[:-1] not in misspelt:
-            told.setdefault(key, _fault(model, detail, details))
+            told.setdefault(key, _fault(model, detail))
     return scene_error(file, *joined(list(told.items())))
 
 
@@ -186,10 +188,10 @@ def _tags(annotation: Any) -> dict[str, Any]:
     }
 
 
-def _fault(model: type[BaseModel], detail: ErrorDetails, every: Sequence[ErrorDetails]) -> str:
+def _fault(model: type[BaseModel], detail: ErrorDetails) -> str:
     kind, given, context = detail["type"], detail["input"], detail.get("ctx", {})
     if kind == "extra_forbidden":
-        return _unknown_key(model, detail["loc"], _missing_beside(detail, every))
+        return _unknown_key(model, detail["loc"])
     if kind == "missing":
         fields = [table.model_fields for table in _chosen_from(model, detail["loc"]).values()]
         name = str(detail["loc"][-1])
@@ -249,17 +251,15 @@ def show(value: object) -> str:
     return text if len(text) <= 40 else text[:37] + "..."
 
 
-def _unknown_key(model: type[BaseModel], key: KeyPath, missing: Sequence[str]) -> str:
+def _unknown_key(model: type[BaseModel], key: KeyPath) -> str:
     """Guess the key that was meant: here first, then the same word in another table."""
     name = str(key[-1])
     if len(key) == 1 and (hint := _word(name)):
         return f"is not a table of a scene: {hint}"
     if key[0] == "springs" and name in ("between", "to", "from"):
         return f"is not a known key: {BETWEEN}"
-    others = [tag for tag, table in _chosen_from(model, key).items() if name in table.model_fields]
-    if others:
-        needed = f"which needs {quoted(missing)}" if missing else f"but of {' and '.join(others)}"
-        return f"is not a key of {key[-2]}, {needed}"
+    if others := _which_have_it(model, key):
+        return f"is not a key of {key[-2]}, but of {' and '.join(others)}"
     if key[0] == "excitation" and name.startswith("frequency"):
         return f"is not a known key: {ORDERS}"
     known = [name for table in tables_at(model, key[:-1]) for name in table.model_fields]
@@ -280,18 +280,16 @@ def _word(name: str) -> str | None:
     )
 
 
-def _missing_beside(detail: ErrorDetails, every: Sequence[ErrorDetails]) -> list[str]:
-    """The keys that are missing in the table of a fault, if it is the first one there."""
-    table = detail["loc"][:-1]
-    here = [d for d in every if d["loc"][:-1] == table]
-    first = next(d for d in here if d["type"] == detail["type"])
-    return [str(d["loc"][-1]) for d in here if d["type"] == "missing" and first is detail]
-
-
 def _chosen_from(model: type[BaseModel], key: KeyPath) -> dict[str, type[BaseModel]]:
     """The tables by tags of which one was chosen that a key is in; none where there is but one."""
     several = _tags(_bare(_walked(model, key[:-2])[1])) if len(key) > 2 else {}
     return {tag: _bare(each) for tag, each in several.items() if key[-2] in several}
+
+
+def _which_have_it(model: type[BaseModel], key: KeyPath) -> list[str]:
+    """Tags of the tables, one of which was chosen, that have the key of a path."""
+    tables = _chosen_from(model, key).items()
+    return [tag for tag, table in tables if str(key[-1]) in table.model_fields]
 
 
 def tables_at(model: type[BaseModel], key: KeyPath) -> list[type[BaseModel]]:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from nldyn.base.errors import SystemModelError
-from nldyn.flow.flow_map import FlowMap, FlowOptions
 from nldyn.longterm.initial_states import state_with
 from nldyn.longterm.lyapunov import LyapunovSpectrum, lyapunov_exponents
 from nldyn.longterm.simulation import Counted, Motion, simulate, sweep
-from nldyn.scene.build import build_system
+from nldyn.scene.build import build_flow
 from nldyn.scene.faults import told_as
 from nldyn.scene.schema.scene import Scene
 
@@ -78,8 +77,7 @@ def simulation_of(
     >>> simulation_of(load_scene(example("one_dof.toml")), 20.0, periods=200).motion
     <Motion of 10 s>
     """
-    table = scene.continuation
-    flow = FlowMap(build_system(scene), FlowOptions(table.rtol) if table else None)
+    flow = build_flow(scene)
     with told_as(scene, ("start",), SystemModelError):
         start = None if scene.start is None else state_with(flow.system, **scene.start.model_dump())
     with told_as(scene, (), SystemModelError):

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from nldyn.base.errors import SystemModelError
-from nldyn.flow.flow_map import FlowMap
-from nldyn.flow.options import FlowOptions
 from nldyn.longterm.poincare import BruteForce, brute_force
 from nldyn.runtime.executors import own_processes
-from nldyn.scene.build import build_system
+from nldyn.scene.build import build_flow
 from nldyn.scene.faults import told_as
 from nldyn.scene.followed import axis_of
-from nldyn.scene.messages import scene_error
 from nldyn.scene.schema.scene import Scene
 
 
@@ -47,10 +44,7 @@ def sweep_of(
     >>> sweep_of(load_scene(example("over_the_gap.toml")), points=2)
     <BruteForce over gap: 4 motions at 2 values, periodic: 4>
     """
-    if scene.continuation is None:
-        fault = "is missing: it says over which parameter and range to sweep"
-        raise scene_error(scene.file, ("continuation",), fault)
-    flow = FlowMap(build_system(scene), FlowOptions(scene.continuation.rtol))
+    flow = build_flow(scene)
     axis = axis_of(scene, flow.system)
     with told_as(scene, (), SystemModelError), own_processes(jobs) as executor:
         return brute_force(

@@ -169,11 +169,11 @@ def test_over_the_gap_folds_are_those_of_the_frequency_at_their_gap(over_gap):
 
 def test_over_the_gap_all_is_told_of_the_gap(over_gap, tmp_path):
     assert "orbits at gap = 0.0003 m" in over_gap.report()
-    write_study(over_gap, tmp_path / "out")
-    with (tmp_path / "out" / "convergence.csv").open() as file:
+    write_study(over_gap, tmp_path)
+    with (tmp_path / "convergence.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert "peak_gap" in rows[0]
-    with (tmp_path / "out" / "special_points_by_model.csv").open() as file:
+    with (tmp_path / "special_points_by_model.csv").open() as file:
         told = [float(row["gap"]) for row in csv.DictReader(file) if row["label"] == "rubin"]
     assert told == [
         value
@@ -223,7 +223,8 @@ def test_the_report_says_from_where_on(study):
 
 
 def test_files(study, tmp_path):
-    folder = write_study(study, tmp_path / "out", "A string")
+    folder = tmp_path
+    write_study(study, folder, "A string")
     with (folder / "convergence.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["label"] for row in rows] == ["rubin"] * 4 + ["truncation"] * 4 + ["full"]
@@ -371,7 +372,8 @@ def test_macneals_method_is_compared_by_its_linear_numbers(meshes):
 
 @pytest.mark.slow
 def test_a_study_of_meshes_is_drawn_over_their_size(meshes, tmp_path):
-    folder = write_study(meshes, tmp_path / "out", "A cantilever")
+    folder = tmp_path
+    write_study(meshes, folder, "A cantilever")
     assert (folder / "meshes.png").is_file()
     assert not (folder / "convergence.png").exists()
     with (folder / "convergence.csv").open() as file:

@@ -41,7 +41,9 @@ def study():
 @pytest.fixture(scope="module")
 def browser(study, tmp_path_factory):
     place = tmp_path_factory.mktemp("study")
-    folder = write_study(study, place / "out", "A <string>")
+    folder = place / "out"
+    folder.mkdir()
+    write_study(study, folder, "A <string>")
     with opened(folder / "convergence.html", place) as browser:
         yield browser
 

@@ -199,8 +199,8 @@ def test_what_is_given_twice_is_told_in_words_of_toml(tmp_path, text, fault):
         (
             '"unbalance"',
             '"harmonic"',
-            "excitation[0].mass_times_radius is not a key of kind 'harmonic', which needs "
-            "'amplitude'",
+            "excitation[0].mass_times_radius is not a key of kind 'harmonic', but of kind "
+            "'unbalance'; also excitation[0].amplitude is missing: kind 'harmonic' needs it",
         ),
         (
             "[continuation]",

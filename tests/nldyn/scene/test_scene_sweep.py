@@ -78,5 +78,5 @@ def test_each_period_of_a_motion_that_hits_a_rigid_stop_has_its_impact(tmp_path)
 def test_a_scene_without_a_range_is_told_so(tmp_path):
     result = told(tmp_path, LINEAR)
     assert result.exit_code == 2
-    assert "continuation is missing: it says over which parameter and range to" in result.stderr
+    assert "continuation is missing: it says over which parameter and range" in result.stderr
     assert not (tmp_path / "out").exists()
