@@ -2,12 +2,14 @@
 
 import math
 import re
+import runpy
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
-from scipy import linalg
+from scipy import linalg, sparse
 from sliding import Body, Contact
 
 import cms
@@ -27,6 +29,7 @@ from nldyn import (
 )
 from nldyn.system import DryFriction, Friction, rest
 
+ROOT = Path(__file__).parents[3]
 GAP = 0.1
 
 
@@ -153,15 +156,41 @@ def two_chains(across=7, along=6):
     )  # fmt: skip
 
 
-def left(component, name, modes):
-    """What the lowest modes and the residual ones of the loads leave of a flexibility, densely."""
-    K, M = component.stiffness, component.mass
-    _, shapes = linalg.eigh(K, M)
-    loads = [component.interfaces[load] for load in ("push", "pull")]
-    basis = np.column_stack([shapes[:, :modes], np.linalg.solve(K, np.array(loads).T)])
-    b = component.interfaces[name]
+def left(component, ends, modes):
+    """What the lowest modes and the residual ones of the loads leave of a flexibility, densely.
+
+    Of one interface, or between two.
+    """
+    K, M = (sparse.csc_array(each).toarray() for each in (component.stiffness, component.mass))
+    _, shapes = linalg.eigh(K, M, subset_by_index=[0, modes - 1])
+    loads = [v for name, v in component.interfaces.items() if name.startswith(("pu", "half"))]
+    basis = np.column_stack([shapes, np.linalg.solve(K, np.array(loads).T)])
+    b = component.interfaces[ends[0]] - sum(component.interfaces[end] for end in ends[1:])
     inner = np.linalg.solve(basis.T @ K @ basis, basis.T @ b)
     return b @ np.linalg.solve(K, b) - (basis.T @ b) @ inner
+
+
+def test_two_beams_come_back_as_integration_from_event_to_event_says(monkeypatch):
+    """The orbit of the gallery's page, with what is left of the flexibilities by dense algebra."""
+    monkeypatch.setattr(
+        "matplotlib.pyplot.subplots", lambda *_, **__: (MagicMock(), [MagicMock()] * 2)
+    )
+    page = runpy.run_path(str(ROOT / "docs/gallery/two_beams.py"))
+    beams, orbit, system = page["beams"], page["orbit"], page["near"]
+    rows = system.participation
+    w, omega = system.natural_frequencies, 200.0 * math.pi
+    across, along = (rows[f"tip a {axis}"] - rows[f"tip b {axis}"] for axis in "yz")
+    give = [left(beams, [f"tip a {axis}", f"tip b {axis}"], 8) for axis in "yz"]
+    load = 2.0 * rows["half b y"] + 20.0 * rows["half b z"]
+    body = Body(
+        np.eye(w.size), np.diag(0.02 * w), np.diag(w**2), lambda t: load * np.cos(omega * t),
+        [Contact(along, Friction(0.3), 0.0, across, 1.0 / give[0], 1.0, 1e-4, 1.0 / give[1])],
+    )  # fmt: skip
+    state = orbit.states([0.0])[0]
+    start = np.append(state, along @ state[: w.size])  # open: what slides goes along
+    back, events = body.followed(start, 0.01, 1e-4)
+    assert events >= 3  # it closes, slides, and opens
+    np.testing.assert_allclose(back, start, atol=1e-8 * np.abs(start).max())
 
 
 @pytest.mark.parametrize("always", [False, True])
@@ -180,7 +209,7 @@ def test_friction_where_nothing_has_mass_agrees_with_integration_from_event_to_e
         **acting,
     )
     across, along, push, pull = (system.participation[name] for name in reduced.interfaces)
-    normal, spring = (1.0 / left(component, name, 6) for name in ("across", "along"))
+    normal, spring = (1.0 / left(component, [name], 6) for name in ("across", "along"))
     contact = Contact(along, law, 0.0, across, normal, 1.0, 0.3, spring)
     if always:
         contact = Contact(along, law, 1.2, spring=spring)
@@ -254,7 +283,7 @@ def test_joined_dual_components_are_refused():
 
 
 def test_the_example_of_the_page_runs(capsys):
-    page = (Path(__file__).parents[3] / "docs/how-to/massless_boundary.md").read_text("utf-8")
+    page = (ROOT / "docs/how-to/massless_boundary.md").read_text("utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", page, flags=re.S)
     names = {}
     exec(code, names)
