@@ -63,6 +63,7 @@ from nldyn.longterm.simulation import sweep as sweep
 
 # orbits: one periodic orbit
 from nldyn.orbits.harmonics import harmonics as harmonics
+from nldyn.orbits.limit_cycle import limit_cycle as limit_cycle
 from nldyn.orbits.orbit import Orbit as Orbit
 from nldyn.orbits.solve import solve_orbit as solve_orbit
 from nldyn.orbits.starts import find_orbits as find_orbits

@@ -13,10 +13,11 @@ from nldyn.bifurcations.codimension_two import is_torus, is_torus_curve, torus_p
 from nldyn.bifurcations.on_curve import between, clear_of_nodes, curve_tests
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.bifurcations.roots import root
+from nldyn.bifurcations.self_excited import corner_error
 from nldyn.bifurcations.sign_changes import leaves_circle
 from nldyn.bifurcations.touching import Touch, touching_extremes
 from nldyn.orbits.bordered import Condition, Corrected, correct, length_unit
-from nldyn.orbits.conditions import UNFOLDED, Both, BranchPointCondition, Grazing, Singular
+from nldyn.orbits.conditions import UNFOLDED, Both, BranchPointCondition, Grazing, Singular, Turning
 
 POLE = 1e-3  # of its values beside it: what a test is not below where it has no root but a pole
 NOISY = 0.1  # the same for a coefficient made of differences, whose rounding is a hundredth of them
@@ -41,7 +42,8 @@ def marks_between(a: BranchNode, b: BranchNode) -> tuple[list[SpecialPoint], lis
     chord, span = Chord(a, b), abs(b.arclength - a.arclength)
     found: list[tuple[float, SpecialPoint]] = []
     notes: list[str] = []
-    for name, test in _changes_of_sign(a, b):
+    jumps = isinstance(a.condition, Turning) and bool(a.corner or b.corner)
+    for name, test in [] if jumps else _changes_of_sign(a, b):
         try:
             sigma, error = root(lambda x, test=test: test(chord.at(x)))  # type: ignore[misc]
             point = chord.at(sigma)
@@ -50,6 +52,8 @@ def marks_between(a: BranchNode, b: BranchNode) -> tuple[list[SpecialPoint], lis
                 if name != "GPD":  # whose coefficient has a pole where a flip meets a fold
                     notes.append(_missing(name, a, "its test jumps there"))
                 continue
+            if name == "LP" and isinstance(a.condition, Turning) and not turns_back(a, b):
+                name = "BP"
             if _is_true(name, point):
                 found.append((sigma, SpecialPoint(name, point, error * span)))
         except FAILURES as error:
@@ -60,7 +64,7 @@ def marks_between(a: BranchNode, b: BranchNode) -> tuple[list[SpecialPoint], lis
         except FAILURES as error:
             notes.append(_missing(_touch_name(a.condition), a, error))
     if b.corner:
-        found.append((1.0, SpecialPoint(b.corner, b, b.orbit.error)))
+        found.append((1.0, SpecialPoint(b.corner, b, corner_error(a, b))))
     found.sort(key=lambda pair: pair[0])
     return [_shot_from(mark, start) for _, mark in found], notes
 
@@ -179,6 +183,12 @@ def _is_true(name: str, point: BranchNode) -> bool:
     if name == "CP":  # the parameters turn back
         return bool(np.abs(point.tangent[-2:]).max() < TURNS_BACK)
     return True
+
+
+def turns_back(a: BranchNode, b: BranchNode) -> bool:
+    """Whether the first parameter turns between two points."""
+    place = a.family.n_states
+    return bool(a.tangent[place] * b.tangent[place] < 0.0)
 
 
 def _missing(name: str, point: BranchNode, why: Exception | str) -> str:

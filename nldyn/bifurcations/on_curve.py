@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -74,6 +74,12 @@ def clear_of_nodes(a: BranchNode, b: BranchNode) -> tuple[BranchNode, BranchNode
         return a, b
     start = start_far_from_impacts(a.orbit)
     return shot_from(a, start), shot_from(b, start)
+
+
+def met_on_curve(points: Sequence[BranchNode], which: int, value: float) -> list[BranchNode]:
+    """Points at which a curve has a value of a parameter, its first one with the others."""
+    first = math.isclose(float(points[0].values[which]), value)
+    return [*points[:first], *passages(points, which, value)]
 
 
 def passages(points: Iterable[BranchNode], which: int, value: float) -> Iterator[BranchNode]:

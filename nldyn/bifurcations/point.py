@@ -200,8 +200,8 @@ class SpecialPoint:
     @property
     def value_error(self) -> float:
         """Estimated error of the value."""
-        chart = self.point.family.charts[0]
-        return self.error * chart.slope(float(self.point.point[-1]))
+        family = self.point.family
+        return self.error * family.charts[0].slope(float(self.point.point[family.n_states]))
 
     def place(self, digits: int = 6) -> str:
         """The values of the parameters, in words."""

@@ -21,6 +21,7 @@ from nldyn.bifurcations.corners import CORNER_STEP, MEETS, corner_ahead, extreme
 from nldyn.bifurcations.on_curve import FARTHEST_NODE, on_chart_plane, on_plane
 from nldyn.bifurcations.period_doubling import flip_between, passed_flip
 from nldyn.bifurcations.point import BranchNode, place_of
+from nldyn.bifurcations.self_excited import at_rest_between, past_corner
 from nldyn.bifurcations.within_step import passes_node
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.guards import (
@@ -48,7 +49,7 @@ from nldyn.branches.past_obstacles import (
 from nldyn.branches.predictor import predicted
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.bordered import FREE, correct, nearest_depth
-from nldyn.orbits.conditions import UNFOLDED, BranchPointCondition, Held, depth_row
+from nldyn.orbits.conditions import UNFOLDED, BranchPointCondition, Held, Turning, depth_row
 from nldyn.orbits.multipliers import EPS
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import FROM_NEAR, metric_length, shifts
@@ -182,7 +183,8 @@ class Stepper:
         """The last points of the walk if it ends in this step, and why."""
         for ends in (
             self._leaves_range, self._dissolves, self._meets_half_period, self._becomes_neutral,
-            self._vanishes, self._grazes, self._closed, self._came_back, self._meets_open_end,
+            self._vanishes, self._shrinks, self._grazes, self._closed, self._came_back,
+            self._meets_open_end,
         ):  # fmt: skip
             last = ends(here, there)
             if last is not None:
@@ -276,7 +278,10 @@ class Stepper:
             made = past_impact_at_node(here, PAST_NODE, NEAR_NODE, options.max_angle)
             made = made or self._past_crossing(here)
             return made and made._replace(step=made.there.arclength - here.arclength)
-        way = corner_ahead(here, options.grazing_step, options.max_step)
+        if isinstance(here.condition, Turning):
+            way = past_corner(here) if here.orbit.system.sliders else []
+        else:
+            way = corner_ahead(here, options.grazing_step, options.max_step)
         if not way:
             return None
         *_, before, last = (here, *way)
@@ -507,6 +512,14 @@ class Stepper:
             return None
         self.stop_reason = Ending.EXTREME_VANISHES.told()
         return [there]
+
+    def _shrinks(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:
+        """A limit cycle that has shrunk to rest, behind which it comes back half a turn later."""
+        end = at_rest_between(here, there)
+        if end is None:
+            return None
+        self.stop_reason = Ending.HOPF.told(place=place_of(end))
+        return [end]
 
     def _grazes(self, _: BranchNode, there: BranchNode) -> list[BranchNode] | None:
         """An impact with a rigid stop too slight to be followed."""

@@ -20,11 +20,12 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.bifurcations.chord import Chord
+from nldyn.bifurcations.on_curve import met_on_curve
 from nldyn.bifurcations.point import BranchNode
 from nldyn.bifurcations.roots import root
 from nldyn.orbits.bordered import FREE, correct
 from nldyn.orbits.orbit import Orbit, same_orbit, stroboscopic
-from nldyn.system.chart import FREQUENCY, Chart, told_value
+from nldyn.system.chart import FREQUENCY, Chart, told_value, value_of
 
 SAME = 4e-15  # difference of two coordinates (logarithms of a frequency) that is rounding
 NEARLY_SAME = 1e-12  # the same, of an orbit solved for and not held there
@@ -76,6 +77,9 @@ def passes(places: Places, orbit: Orbit) -> bool:
     The branch is solved for only where its chord comes near the orbit.
     """
     family = places.points[0].family
+    if places.points[0].condition is not FREE:
+        value = value_of(orbit.system, orbit.frequency_hz, family.charts[0].parameter)
+        return any(same_orbit(p.orbit, orbit) for p in met_on_curve(places.points, 0, value))
     p = float(family.unknowns(orbit)[-1])
     if not family.holds(orbit):
         return False
@@ -158,6 +162,8 @@ def _arclength(point: BranchNode) -> float:
 def _crossings(places: Places, value: float) -> tuple[list[BranchNode], list[str]]:
     chart = places.points[0].family.charts[0]
     check_value("frequency_hz" if chart.parameter.name == FREQUENCY else "value", chart, value)
+    if places.points[0].condition is not FREE:
+        return list(met_on_curve(places.points, 0, value)), []
     p = chart.coordinate(value)
     on, passed = _passages(places, p)
     points, exact = places.points, set(on.tolist())

@@ -346,7 +346,7 @@ class Branch:
 
     def multipliers(self, part: Part = "points") -> NDArray[np.complex128]:
         """Floquet multipliers (k, 2n) of the orbits of a `table`."""
-        size = self.nodes[0].orbit.problem.size
+        size = self.nodes[0].orbit.multipliers.size
         found = [point.orbit.multipliers for point in self._part(part)]
         return np.array(found, dtype=complex).reshape(-1, size)
 

@@ -27,17 +27,26 @@ from nldyn.branches.branch import (
     Course,
 )
 from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_at
+from nldyn.branches.conditioned import of_self_excited, start_on
 from nldyn.branches.endings import Ending, StopReason, StopReasons
 from nldyn.branches.leg import Leg, LegBuilder, Progress
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.bordered import FREE, OrbitFamily, Place, correct
+from nldyn.orbits.conditions import Turning
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
 from nldyn.runtime.prefetch import Ahead
 from nldyn.runtime.progress import of_value, shows_progress
 from nldyn.runtime.threads import one_thread
-from nldyn.system.chart import FREQUENCY, Chart, checked_parameter, told_value, value_of
+from nldyn.system.chart import (
+    FREQUENCY,
+    Chart,
+    checked_parameter,
+    moves_frequency,
+    told_value,
+    value_of,
+)
 from nldyn.system.parameters import Parameter
 
 FROM_FOLD = 1e-4  # arclength from a fold to the point at which a branch through it begins
@@ -63,7 +72,8 @@ def continue_branch(
 ) -> Branch:
     """Continue an orbit in both directions through a range of a parameter, or go on with a branch.
 
-    The parameter is the excitation frequency unless another one is named; all others are held. A
+    The parameter is the excitation frequency unless another one is named; all others are held. Of
+    a self-excited motion, as of `limit_cycle`, one must be named, and its frequency goes along. A
     branch is finished where it was interrupted, and followed beyond the ends of its range. Its
     points are those of one continuation through the new range on its scale, to the last digit;
     those at the ends of the old range are left out.
@@ -152,9 +162,13 @@ def continue_branch(
         alike(family, [numbers("open_ends", end) for end in open_ends]),
         check_requested(() if at is None else at, chart),
         events=checked_events(() if events is None else events),
+        further=tuple((other.low, other.high) for other in family.charts[1:]),
     )
     check_values(course.events, start)
-    first = start_point(family.place(start), 1.0)
+    if start.self_excited:
+        first = start_on(family, start, Turning())
+    else:
+        first = start_point(family.place(start), 1.0)
     with checkpoint_at(checkpoint, start.system) as kept:
         known = kept.branch_from(first, course)
         if known is not None:
@@ -167,10 +181,13 @@ def family_over(
 ) -> OrbitFamily:
     """The family of an orbit in one parameter over a range, checked.
 
+    That of a self-excited motion has its frequency as a second one.
+
     Raises
     ------
     SystemModelError
-        If the range is empty or does not hold the orbit, or there is no such parameter.
+        If the range is empty or does not hold the orbit, there is no such parameter, or it is the
+        frequency of a self-excited motion.
     """
     chosen = checked_parameter(orbit.system, FREQUENCY if parameter is None else parameter)
     chart = Chart.of(chosen, limits)
@@ -181,7 +198,13 @@ def family_over(
             f"the orbit at {told_value(chart.parameter, value)} lies outside {chart.range_name} = "
             f"({chart.low:g}, {chart.high:g})"
         )
-    return OrbitFamily.around(orbit, (chart,))
+    if not orbit.self_excited:
+        return OrbitFamily.around(orbit, (chart,))
+    if moves_frequency(chosen):
+        raise SystemModelError(
+            "the frequency of a self-excited motion is found, not given: name another parameter"
+        )
+    return of_self_excited(orbit, chart)
 
 
 def extended(
@@ -214,8 +237,9 @@ def extended(
         events=course.events if events is None else checked_events(events),
     )
     check_values(new.events, branch.points[0])
-    with checkpoint_at(checkpoint, branch.nodes[0].family.system) as kept:
-        return going_on(branch, (chart,), new, progress, kept)
+    family = branch.nodes[0].family
+    with checkpoint_at(checkpoint, family.system) as kept:
+        return going_on(branch, (chart, *family.charts[1:]), new, progress, kept)
 
 
 def going_on(

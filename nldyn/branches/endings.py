@@ -23,6 +23,7 @@ class Ending(Enum):
     BEGINS_AT = "begins at an amplitude of {place}"
     PARAMETER_RANGE_END = "end of the range of {parameter}"
     SCALES_TO_REST = "the orbits shrink in proportion to {parameter}, to rest where it is zero"
+    HOPF = "the limit cycle shrinks to rest at {place}, a Hopf point"
     CLOSED_BRANCH = "closed branch"
     CLOSED_CURVE = "closed curve"
     JOINS = "joins the branch of period {period} at the flip at {place}"

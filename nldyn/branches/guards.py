@@ -21,11 +21,12 @@ from nldyn.bifurcations.codimension_two import cosine_near, is_torus_curve, toru
 from nldyn.bifurcations.corners import grazes_linear
 from nldyn.bifurcations.period_doubling import half_difference, passed_flip
 from nldyn.bifurcations.point import BranchNode, node_of
+from nldyn.bifurcations.self_excited import sticking
 from nldyn.bifurcations.sign_changes import crosses
 from nldyn.bifurcations.touching import rigid_grazing, rigid_touches
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.bordered import FREE, Condition, Corrected, OrbitFamily, length_unit
-from nldyn.orbits.conditions import TOUCH, Grazing, Singular
+from nldyn.orbits.conditions import TOUCH, Grazing, Singular, Turning
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import BROKEN, metric_length, shifts
 
@@ -118,7 +119,8 @@ class Attempt:
         A linear stop that is touched bends it; a force that jumps does where the phase of a switch
         passes one of shooting, as the state there has a corner.
         """
-        if not (self.step <= KINK and self.free and self.miss < 1.0):
+        bends = self.free or isinstance(self.here.condition, Turning)
+        if not (self.step <= KINK and bends and self.miss < 1.0):
             return False
         a, b = self.here.orbit, self.found.orbit
         return b.system.jumps or self.touched or rubs_all_around(a) != rubs_all_around(b)
@@ -219,6 +221,15 @@ def touches(attempt: Attempt) -> str:
     return _told("the number of contacts changes", far)
 
 
+def changes_sticking(attempt: Attempt) -> str:
+    """A self-excited motion begins or ceases to stick: its branch has a corner."""
+    here = attempt.here
+    if not isinstance(here.condition, Turning) or not here.orbit.system.sliders:
+        return ""
+    changes = sticking(here.orbit) != sticking(attempt.found.orbit)
+    return _told("a slider begins or ceases to stick", changes)
+
+
 def meets_flip(attempt: Attempt) -> str:
     """A doubled branch meets the one it comes from in a long step."""
     long = attempt.step > max(MEETING_STEP, attempt.crossing)
@@ -262,7 +273,8 @@ def guards_of(free: bool, rigid: bool, period: int) -> tuple[Sequence[Guard], Se
         (bends_at_rigid_grazing, rigid),
     )  # fmt: skip
     of_smooth_steps = (
-        (misses, True), (is_off, True), (turns, True), (changes_pair, not free), (touches, True),
+        (misses, True), (is_off, True), (turns, True), (changes_pair, not free),
+        (changes_sticking, not free), (touches, True),
         (meets_flip, period % 2 == 0), (crosses_branch, free), (ends_on_crossing, free),
     )  # fmt: skip
     first, further = (

@@ -29,7 +29,7 @@ from nldyn.branches.branch import WalkEnd
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.bordered import FREE, Solved, length_unit
-from nldyn.orbits.conditions import grazing_beside
+from nldyn.orbits.conditions import Turning, grazing_beside
 from nldyn.orbits.orbit import Orbit, same_orbit
 from nldyn.system.chart import FREQUENCY, told_value
 
@@ -364,8 +364,9 @@ class LegBuilder:
 
 
 def _told(node: BranchNode) -> float | Real:
-    """The parameter's value at a point, or the values of several."""
-    return node.value if len(node.family.charts) == 1 else node.values
+    """The parameter's value at a point, or the values of several; of a frequency found none."""
+    alone = len(node.family.charts) == 1 or isinstance(node.condition, Turning)
+    return node.value if alone else node.values
 
 
 def _grazing_at_end(nodes: Sequence[BranchNode]) -> SpecialPoint:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
@@ -23,17 +22,18 @@ from nldyn.base.errors import (
     shown,
 )
 from nldyn.bifurcations.chord import Chord
-from nldyn.bifurcations.on_curve import passages
-from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special, node_of
+from nldyn.bifurcations.on_curve import met_on_curve
+from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special
 from nldyn.bifurcations.roots import root
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.branch import Branch, Course
 from nldyn.branches.checkpoint import Checkpoint
+from nldyn.branches.conditioned import start_on
 from nldyn.branches.continuation import alike, complete, going_on, start_point
 from nldyn.branches.endings import Ending, StopReasons, has_ending
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.branches.tables import orbit_columns
-from nldyn.orbits.bordered import Condition, OrbitFamily, correct, gradient, tangent_surface
+from nldyn.orbits.bordered import Condition, OrbitFamily
 from nldyn.orbits.conditions import Held, Monitor, defined_by
 from nldyn.orbits.orbit import Orbit, check_minimal, same_orbit
 from nldyn.runtime.progress import of_place, shows_progress
@@ -43,7 +43,6 @@ from nldyn.system.system import System
 
 CurvePart = Literal["points", "marks"]
 CLOSE = 1e-3  # how far the defining condition of a start may be off
-CROSSES_END = 1e-3  # component of a unit tangent that leads to or from the end of a range
 SAME_VALUE = 1e-8  # relative difference of parameters of one place
 
 
@@ -234,9 +233,8 @@ class Curve:
         if not is_finite(value):
             raise SystemModelError(f"value must be a finite number, got {shown(value)}")
         which = self._index_of(parameter)
-        first = self.points[:1] if math.isclose(self.values[0, which], value) else ()
         found: list[BranchNode] = []
-        for point in (*first, *passages(self.points, which, value)):
+        for point in met_on_curve(self.points, which, value):
             if not any(_same_place(point, other) for other in found):
                 found.append(point)
         return [point.orbit for point in found]
@@ -328,7 +326,7 @@ def special_start(special: SpecialPoint, charts: tuple[Chart, ...]) -> BranchNod
     orbit = special.orbit
     family, condition = defined_by(special.kind, OrbitFamily.around(orbit, charts), orbit)
     _check_special(special.kind, family, orbit, condition)
-    return _start(family, orbit, condition)
+    return start_on(family, orbit, condition)
 
 
 @shows_progress(of_place("curve"))
@@ -375,7 +373,7 @@ def continue_constant(
     charts = _charts(orbit, parameters, ranges, options, progress)
     condition = Held.of(monitor, value, orbit)
     orbit = _with_value(orbit, condition, charts[0], options or ContinuationOptions())
-    start = _start(OrbitFamily.around(orbit, charts), orbit, condition)
+    start = start_on(OrbitFamily.around(orbit, charts), orbit, condition)
     return _curve(condition.name, start, options, progress, checkpoint)
 
 
@@ -516,30 +514,3 @@ def _same_place(a: BranchNode, b: BranchNode) -> bool:
     """Whether two points have the same orbit of the same system."""
     same = np.allclose(a.values, b.values, rtol=SAME_VALUE, atol=0.0)
     return same and same_orbit(a.orbit, b.orbit)
-
-
-def _start(family: OrbitFamily, orbit: Orbit, condition: Condition) -> BranchNode:
-    """First point of a curve, heading up in its first parameter."""
-    guess = family.unknowns(orbit)
-    first = family.n_states
-    at = family.at(guess)
-    _, surface = tangent_surface(at)
-    by_surface = gradient(at, surface, condition)
-    along = surface @ np.linalg.svd(by_surface)[2][-1] if by_surface.size else surface[:, 0]
-    row = family.metric(guess) * along
-    for place, chart in enumerate(family.charts, first):
-        at_end = chart.value(float(guess[place])) in (chart.low, chart.high)
-        if at_end and abs(along[place]) > CROSSES_END * np.linalg.norm(along):
-            row = np.zeros(guess.size)  # held there, as behind it there may be no system
-            row[place] = 1.0
-    row /= np.linalg.norm(row)
-    found = correct(family, guess, condition, row, float(row @ guess))
-    if not found.converged:
-        raise ConvergenceError(
-            f"the start of the curve at {orbit.frequency_hz:g} Hz was not found: {found.failure}"
-        )
-    for chart, value in zip(family.charts, found.at.values.tolist(), strict=True):
-        chart.check_start(value)
-    up = np.zeros(guess.size)
-    up[first] = 1.0
-    return node_of(found, up, 0.0)

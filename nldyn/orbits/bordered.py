@@ -84,6 +84,8 @@ class OrbitFamily:
         Where rigid stops let the motions pass.
     origin : (N,) array, optional
         States from which the size of orbits counts; zero unless given.
+    least : float
+        Unit of relative lengths where orbits are smaller: where a limit cycle shrinks to rest.
     """
 
     problem: ShootingProblem
@@ -93,6 +95,7 @@ class OrbitFamily:
     unfolding: Real | None = None
     passages: tuple[Passage, ...] = ()
     origin: Real | None = None
+    least: float = 0.0
 
     @classmethod
     def around(cls, orbit: Orbit, charts: tuple[Chart, ...]) -> OrbitFamily:
@@ -236,7 +239,8 @@ class OrbitFamily:
     def scale(self, point: Real) -> float:
         """Root mean square of the states: the unit of relative lengths."""
         states = point[: self.n_states] if self.origin is None else self.from_origin(point)
-        return math.sqrt(float(states @ states) / self.problem.segments) or 1.0
+        size = math.sqrt(float(states @ states) / self.problem.segments)
+        return max(size, self.least) or 1.0
 
     def from_origin(self, point: Real) -> Real:
         """States (N,) counted from the origin."""

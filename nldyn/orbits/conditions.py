@@ -685,6 +685,25 @@ class Phase:
         return Phase.of(at)
 
 
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """A self-excited motion begins where the observed displacement turns."""
+
+    def value(self, at: Evaluation) -> Real:
+        """Speed there, relative to the size of the orbit, shape (1,)."""
+        flow = at.problem.flow
+        row = flow.rate_rows[flow.system.output(at.family.observe)]
+        return np.array([row @ at.nodes[0] / (np.linalg.norm(row) * at.family.scale(at.point))])
+
+    def reach(self, at: Evaluation) -> float:
+        """Any, as it is linear."""
+        return DIFFERENCE
+
+    def renewed(self, at: Evaluation) -> Turning:
+        """The same."""
+        return self
+
+
 def nearest_crossing(place: Place, longest: float = math.inf) -> tuple[Solved, float] | None:
     """The crossing of branches beside an orbit, and its unfolding relative to the orbit.
 

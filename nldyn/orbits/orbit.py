@@ -37,6 +37,7 @@ from nldyn.orbits.multipliers import (
     parts_for,
     uncertainties,
 )
+from nldyn.orbits.self_excited import across, along, moves, paces
 from nldyn.orbits.shooting import ShootingProblem
 from nldyn.system.round_stop import RoundStop
 from nldyn.system.system import System
@@ -208,9 +209,32 @@ class Orbit:
         """
         return chain(self.jacobians)
 
+    @cached_property
+    def self_excited(self) -> bool:
+        """Whether nothing excites the motion, which loses and gains energy: a limit cycle."""
+        system = self.system
+        if system.driven or system.conservative:
+            return False
+        return moves(self.problem, self.point, self._paces)
+
+    @cached_property
+    def _paces(self) -> Real:
+        return paces(self.problem, self.point)
+
+    @property
+    def multiplier_along(self) -> float | None:
+        """The multiplier along a self-excited motion, which is 1 but for errors; else None.
+
+        It stands in none of the `multipliers`, and has no part in the stability.
+        """
+        return along(self.jacobians, self._paces) if self.self_excited else None
+
     @property
     def multipliers(self) -> NDArray[np.complex128]:
-        """Floquet multipliers, largest first, shape (2n,)."""
+        """Floquet multipliers, largest first, shape (2n,).
+
+        Of a self-excited motion those across it, (2n - 1,): see `multiplier_along`.
+        """
         return self._spectrum[0].multipliers
 
     @property
@@ -234,6 +258,9 @@ class Orbit:
         Segments that squeeze a direction almost to their own rounding error are cut into parts.
         """
         try:
+            if self.self_excited:
+                jacobians = across(self.jacobians, self._paces)
+                return floquet_spectrum(jacobians), jacobians
             found, jacobians = floquet_spectrum(self.jacobians), self.jacobians
             parts = parts_for(found.squeeze)
             while found.squeeze < COARSE and parts <= MOST_PARTS:
@@ -251,13 +278,16 @@ class Orbit:
         """Estimate of how far each of the `log_moduli` may be off, (2n,).
 
         Of each segment's Jacobian a relative error of ten times the flow map's `rtol` is assumed
-        (or of ten times `error`, where that is more, and with a law of one's own the `flow_error`);
+        (or of ten times `error`, where that is more, with a law of one's own the `flow_error`, and
+        of a self-excited motion how far `multiplier_along` is off);
         see `nldyn.orbits.multipliers.uncertainties`.
         """
         found, jacobians = self._spectrum
         error = max(self.problem.flow.options.rtol, self.error)
         if self._own_laws:
             error = max(error, self.flow_error.monodromy)
+        if self.self_excited:
+            error = max(error, abs(along(self.jacobians, self._paces) - 1.0))
         if not error < 1.0:
             return np.full(found.log_moduli.shape, np.inf)
         return uncertainties(jacobians, found, 10.0 * error)

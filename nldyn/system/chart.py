@@ -40,11 +40,12 @@ EVERY_MODE = -1
 
 _OF_STOPS = OF_STOPS
 _OF_DAMPERS = ("coefficient",)
+BASE_SPEED = "base_speed"  # of a slider
 _OF_SPRINGS = {"spring_stiffness": "stiffness"}  # and what it is called there
 _OF_MODES = ("modal_damping", "natural_frequency_hz")
 OF_ELEMENTS = (
     *(*_OF_STOPS, *OF_AREAS, *OF_ROUND, *SOURCES, *OF_SLIDERS),
-    *(*_OF_DAMPERS, *_OF_SPRINGS, *OF_SPRINGS),
+    *(BASE_SPEED, *_OF_DAMPERS, *_OF_SPRINGS, *OF_SPRINGS),
 )
 UNITS = {
     "frequency_hz": "Hz",
@@ -69,6 +70,7 @@ UNITS = {
     "friction": "1",
     "normal_force": "N",
     "tangential_stiffness": "N/m",
+    BASE_SPEED: "m/s",
     "coefficient": "N s/m",
     "spring_stiffness": "N/m",
     "modal_damping": "1",
@@ -164,9 +166,9 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     parameter : str or Parameter
         An `OwnParameter`, or frequency_hz; gap, stiffness, exponent, dissipation, dashpot or
         restitution of a stop; amplitude, mass_times_radius or force of an excitation; friction or
-        normal_force of a slider; area_gap, area_stiffness or area_friction of an area of contact;
-        coefficient of a damper; spring_stiffness of a linear spring; k1,
-        k2, ... of a polynomial one;
+        normal_force of a slider, or base_speed of what it slides on; area_gap, area_stiffness or
+        area_friction of an area of contact; coefficient of a damper; spring_stiffness of a linear
+        spring; k1, k2, ... of a polynomial one;
         modal_damping (ratio) or natural_frequency_hz of a mode; spin_hz of a system with a `Spin`,
         or speed_hz, which is spin and frequency in one where they are equal. The index -1 of
         modal_damping means all modes, which then have one ratio.
@@ -186,6 +188,8 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
         raise SystemModelError(f"unknown parameter {shown(name)}; there are: {', '.join(NAMES)}")
     if has_exact_derivatives(parameter):
         check_exact(system, parameter)
+    elif parameter.name == BASE_SPEED:
+        check_index(parameter, "slider", len(system.sliders))
     elif parameter.name in _OF_DAMPERS:
         check_index(parameter, "damper", len(system.dampers))
         if isinstance(system.dampers[parameter.index], DryFriction):
@@ -320,6 +324,8 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
         if name == "area_gap":
             return min(stop.gap for stop in points)
         return points[0].stiffness / points[0].share
+    if name == BASE_SPEED:
+        return system.sliders[index].friction.base_speed
     if name == "friction":
         return system.sliders[index].friction.coefficient
     if name in OF_ROUND:
@@ -329,7 +335,7 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
 
 def elements_of(system: System, name: str) -> Sequence[Any]:
     """The elements of a system of which a parameter of some name is a number."""
-    if name in OF_SLIDERS:
+    if name in (*OF_SLIDERS, BASE_SPEED):
         return system.sliders
     if name in OF_AREAS:
         return [system.stops[places[0]] for places in system.areas.values()]
@@ -374,8 +380,8 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
         return system.with_elements(
             springs=_replaced(system.springs, index, "coefficients", tuple(values))
         )
-    if name in OF_SLIDERS:
-        return system.with_slider(index, OF_SLIDERS[name], value)
+    if name in (*OF_SLIDERS, BASE_SPEED):
+        return system.with_slider(index, OF_SLIDERS.get(name, name), value)
     if name in SOURCES:
         return system.with_elements(excitation=_replaced(system.excitation, index, name, value))
     if name in _OF_DAMPERS:

@@ -903,12 +903,15 @@ class System:
     def with_slider(self, number: int, name: str, value: float) -> System:
         """The system with another number of one of its `sliders`.
 
-        That is its `coefficient`, `normal_force` or `tangential_stiffness`.
+        That is its `coefficient`, `normal_force` or `tangential_stiffness`, or the `base_speed` of
+        what it slides on.
         """
         slider = self.sliders[number]
         change: dict[str, Any] = {name: value}
         if name == "coefficient":
             change = {"friction": slider.friction.with_coefficient(value)}
+        elif name == "base_speed":
+            change = {"friction": replace(slider.friction, base_speed=value)}
         if slider.stop >= 0:
             stops = list(self.stops)
             pressing = stops[slider.stop]
