@@ -19,6 +19,7 @@ import numpy as np
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError
 from nldyn.flow.flow_map import Segments
+from nldyn.flow.rigid_impacts import slider_of
 from nldyn.orbits.bordered import Evaluation, OrbitFamily
 from nldyn.orbits.conditions import Grazing
 from nldyn.orbits.orbit import Orbit
@@ -150,8 +151,21 @@ class Touches:
 
     @property
     def kicks(self) -> Real:
-        """Changes (m, 2n) of the states by impulses that give the gaps the speed 1."""
-        kicks = self.problem.flow.force_columns[:, list(self.stops)].T
+        """Changes (m, 2n) of the states by impulses that give the gaps the speed 1.
+
+        With those of friction on what slides along the stops.
+        """
+        flow, states = self.problem.flow, self.states
+        if self.at.change is not None:
+            states = states @ self.at.change[0].T
+        kicks = flow.force_columns[:, list(self.stops)].T.copy()
+        for kick, stop, state in zip(kicks, self.stops, states, strict=True):
+            number = slider_of(flow.system, stop)
+            if number is None:
+                continue
+            row, friction = len(flow.system.stops) + number, flow.system.sliders[number].friction
+            way = np.sign(flow.rate_rows[row] @ state - friction.base_speed)
+            kick += way * friction.coefficient * flow.force_columns[:, row]
         if self.at.change is not None:
             kicks = kicks @ self.at.change[1].T
         return np.asarray(kicks / (self.rows[1] * kicks).sum(1)[:, None])

@@ -19,6 +19,7 @@
 #include "guess.c"
 #include "events.c"
 #include "contact.c"
+#include "rubbing_impact.c"
 #include "rigid.c"
 #include "record.c"
 #include "segments.c"

@@ -21,7 +21,8 @@
 /* outcomes; the names and numbers of layout.py */
 enum Status {
     OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL, ROUNDED,
-    TOO_MANY_STEPS, OTHER_CONTACTS, INTERRUPTED, OUT_OF_MEMORY, SLIDING_TURNS
+    TOO_MANY_STEPS, OTHER_CONTACTS, INTERRUPTED, OUT_OF_MEMORY, SLIDING_TURNS,
+    UNDECIDED
 };
 
 #define FLIGHT (-1) /* kind of a piece that is no contact panel */
@@ -242,6 +243,7 @@ typedef struct {
     double *drags; /* (n_stops,) speeds of the places of sliders behind springs, see `drag_speed` */
     int *resting, *mobility_order;
     double *rate, *moved, *moved_shift, *along, *along_columns, *offsets;
+    double *closing, *sliding, *pull; /* strike, hold */
     bool *struck, *still;
 } Scratch;
 
@@ -272,6 +274,7 @@ typedef struct {
     double shortest, reach;  /* reach: length of a panel that the bonds are likely to allow */
     bool bonded;
     int start_switch;  /* whether a stop has switched just now */
+    int undecided;     /* rigid stop whose force with friction nothing tells, or -1 */
 } Motion;
 
 /* value and first two time derivatives of an output, and a bound on the third */

@@ -21,7 +21,8 @@ _RECORD = struct.Struct("3q")
 (
     OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL, ROUNDED,
     TOO_MANY_STEPS, OTHER_CONTACTS, INTERRUPTED, OUT_OF_MEMORY, SLIDING_TURNS,
-) = range(13)  # fmt: skip
+    UNDECIDED,
+) = range(14)  # fmt: skip
 ROUND = 1.5  # below this exponent a slope sets in almost at once: nodes at the switch count
 
 

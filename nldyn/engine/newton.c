@@ -29,7 +29,7 @@ typedef struct {
     const Complex *drive_by; /* (n_parameters, h, 3, 2n) derivative of `drive` by each */
     const double *row, *aim; /* (n_unknowns,) */
     const double *like; /* block of the record of a motion nearby, whose panels are guesses, or none */
-    double *told; /* (3,) number of steps, lengths of the first and the last */
+    double *told; /* (3,) number of steps, lengths of the first and the last; undecided: stop, phase */
     double *along; /* (n_unknowns,) vector along the branch, of no particular length */
     double *ends; /* (k, 2n) */
     double *jacobians; /* (k, 2n, 2n), or one of them without columns, as what follows */
@@ -104,6 +104,10 @@ static int shoot(Call *call)
         Outcome outcome = {task->ends + i * size, task->jacobians + j * size * size,
                            task->d_omegas + j * size, task->d_parameters + j * size * count};
         int status = propagate(M, start, task->phases[i], duration, call->fastest, outcome);
+        if (status == UNDECIDED) {
+            task->told[1] = M->undecided;
+            task->told[2] = task->phases[i] + call->omega * M->t;
+        }
         if (status != OK) return status;
     }
     return OK;

@@ -64,7 +64,8 @@ class Found(NamedTuple):
         `OK`, `DIVERGED`, `SINGULAR`, `NOT_CONVERGED` or why the flow map failed.
     iterations : int
     first, last : float
-        Lengths of the first and the last step.
+        Lengths of the first and the last step; of `UNDECIDED` friction at a rigid stop the stop
+        and the forcing phase.
     along : (N + 1,)
         Vector along the branch, of no particular length; none of the flow map alone.
     ends, jacobians, d_omegas, d_parameters : (k, 2n), (k, 2n, 2n), (k, 2n), (k, 2n, n_parameters)

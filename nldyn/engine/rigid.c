@@ -29,13 +29,43 @@ static int held_stops(const Motion *M, bool with_sliders)
     return n;
 }
 
+/* slider that a rigid stop presses on, or -1 */
+static int rubbed_by(const Flow *fl, int stop)
+{
+    for (int s = stop + 1; s < fl->n_stops && is_rigid(fl, stop); s++)
+        if (is_pressed(fl, s) && (int)stop_of(fl, s)->normal == stop) return s;
+    return -1;
+}
+
+/* what slides as a rigid stop presses it on, or -1 */
+static int sliding_with(const Motion *M, int stop)
+{
+    int slider = rubbed_by(M->fl, stop);
+    return slider >= 0 && M->closed[slider] && M->fl->slides[slider] != 0 ? slider : -1;
+}
+
+/* friction there per unit of its force, in the sense of sliding */
+static double rubbing_share(const Flow *fl, int slider)
+{
+    return slider < 0 ? 0.0 : fl->slides[slider] * stop_of(fl, slider)->friction;
+}
+
+/* speed that a unit impulse at a stop, with that of what slides on it, takes from another */
+static double taken_by(const Motion *M, int stop, int other)
+{
+    int slider = sliding_with(M, other);
+    double taken = between(M->fl, stop, other);
+    if (slider >= 0) taken += rubbing_share(M->fl, slider) * between(M->fl, stop, slider);
+    return taken;
+}
+
 /* fill and factor the speeds of closing per unit impulse of each of the `resting` stops, (n, n) */
 static void factor_mobilities(const Motion *M, int n)
 {
     Scratch *s = M->s;
     for (int a = 0; a < n; a++)
         for (int b = 0; b < n; b++)
-            s->mobility[b * n + a] = between(M->fl, s->resting[a], s->resting[b]);
+            s->mobility[b * n + a] = taken_by(M, s->resting[a], s->resting[b]);
     lu_factor(s->mobility, n, s->mobility_order);
 }
 
@@ -64,8 +94,10 @@ static void contact_forces(const Motion *M, double phase)
     for (int a = 0; a < count; a++) holding[a] = rates[stops[a]];
     lu_apply_vector(M->s->mobility, count, M->s->mobility_order, holding);
     for (int a = 0; a < count; a++) {
+        int slider = sliding_with(M, stops[a]);
         forces[stops[a]] = holding[a];
-        for (int s = 0; s < n; s++) rates[s] -= between(fl, s, stops[a]) * holding[a];
+        if (slider >= 0) forces[slider] = rubbing_share(fl, slider) * holding[a];
+        for (int s = 0; s < n; s++) rates[s] -= taken_by(M, s, stops[a]) * holding[a];
     }
 }
 
@@ -151,25 +183,66 @@ static void shifted_columns(const Motion *M, int stop, int order, double phase, 
     for (int c = 0; c < M->n_columns; c++) found[c] += pace * shift[c];
 }
 
-/* one impact: the impulse on the state, and its sensitivities */
+/* take impulses at a stop or slider, and their changes (n_columns,), from the state */
+static void push_state(Motion *M, int stop, double impulse, const double *by)
+{
+    const Flow *fl = M->fl;
+    const double *push = push_of(fl, stop);
+    for (int k = 0; k < fl->size && M->with_columns; k++)
+        for (int c = 0; c < M->n_columns; c++)
+            M->columns[(size_t)k * M->n_columns + c] -= push[k] * by[c];
+    for (int k = 0; k < fl->size; k++) M->w[k] -= push[k] * impulse;
+}
+
+/* speed at which what a rigid stop presses on slides, if beyond rounding */
+static double slip_at(const Motion *M, int slider, double phase)
+{
+    const Flow *fl = M->fl;
+    double belt = stop_of(fl, slider)->belt;
+    double slip = output_now(fl, slider, M->w, phase).first - belt;
+    double noise = SHUT * (rate_noise(fl, slider, M->w) + SUM_ROUNDING * fabs(belt));
+    return fabs(slip) <= noise ? 0.0 : slip;
+}
+
+/* fill changes (n_columns,) of an impulse by those of the speeds of closing and sliding, of the
+ * restitution and the friction */
+static void blow_columns(const Motion *M, int stop, int slider, const double *derivatives,
+                         const double *closing, const double *sliding, double *by)
+{
+    const Flow *fl = M->fl;
+    for (int c = 0; c < M->n_columns; c++) {
+        by[c] = closing[c] * derivatives[BY_SPEED];
+        if (slider >= 0) by[c] += sliding[c] * derivatives[BY_SLIP];
+    }
+    for (int c = 0; c < fl->n_parameters; c++) {
+        if (is_parameter(fl, c, RESTITUTION, stop)) by[fl->size + c] += derivatives[BY_RESTITUTION];
+        if (slider >= 0 && is_parameter(fl, c, FRICTION, slider))
+            by[fl->size + c] += derivatives[BY_FRICTION];
+    }
+}
+
+/* one impact: the impulses on the state, and its sensitivities */
 static void strike(Motion *M, int stop, double speed, Value restitution, double phase, double t,
                    const double *shift)
 {
     const Flow *fl = M->fl;
-    double mobility = stop_of(fl, stop)->mobility, *by = M->s->moved;
-    double impulse = (1.0 + restitution.value) * speed / mobility;
-    const double *push = push_of(fl, stop);
+    Scratch *s = M->s;
+    int slider = rubbed_by(fl, stop);
+    Rubbing at = {stop_of(fl, stop)->mobility, 0.0, 1.0, 0.0};
+    if (slider >= 0)
+        at = (Rubbing){at.normal, between(fl, stop, slider), stop_of(fl, slider)->mobility,
+                       stop_of(fl, slider)->friction};
+    Blow hit = blow(at, restitution, speed, slider < 0 ? 0.0 : slip_at(M, slider, phase));
     if (M->with_columns) {
-        shifted_columns(M, stop, 1, phase, t, shift, by);
-        for (int c = 0; c < M->n_columns; c++)
-            by[c] *= (1.0 + restitution.value + restitution.slope * speed) / mobility;
-        for (int c = 0; c < fl->n_parameters; c++)
-            if (is_parameter(fl, c, RESTITUTION, stop)) by[fl->size + c] += speed / mobility;
-        for (int k = 0; k < fl->size; k++)
-            for (int c = 0; c < M->n_columns; c++)
-                M->columns[(size_t)k * M->n_columns + c] -= push[k] * by[c];
+        shifted_columns(M, stop, 1, phase, t, shift, s->closing);
+        if (slider >= 0) shifted_columns(M, slider, 1, phase, t, shift, s->sliding);
+        blow_columns(M, stop, slider, hit.normal_by, s->closing, s->sliding, s->moved);
     }
-    for (int k = 0; k < fl->size; k++) M->w[k] -= push[k] * impulse;
+    push_state(M, stop, hit.normal, s->moved);
+    if (slider < 0) return;
+    if (M->with_columns)
+        blow_columns(M, stop, slider, hit.tangent_by, s->closing, s->sliding, s->moved);
+    push_state(M, slider, hit.tangent, s->moved);
 }
 
 /* fill s->offsets (count, 1 + n): gaps (rate 0) of the `resting` stops or the rates, and their
@@ -190,6 +263,17 @@ static void fill_offsets(const Motion *M, double phase, double t, const double *
     }
 }
 
+/* fill what a unit impulse at a stop, with that of what slides on it, takes from the state (2n,) */
+static void fill_pull(const Motion *M, int stop, double *pull)
+{
+    const Flow *fl = M->fl;
+    int slider = sliding_with(M, stop);
+    for (int k = 0; k < fl->size; k++) {
+        pull[k] = push_of(fl, stop)[k];
+        if (slider >= 0) pull[k] += rubbing_share(fl, slider) * push_of(fl, slider)[k];
+    }
+}
+
 /* Shut the gaps of the stops that a body rests on, and stop their rates and those of the sliders
  * that stick, in all sensitivities: by a shift of the displacements along what an impulse moves,
  * and by an impulse. */
@@ -205,10 +289,10 @@ static void hold(Motion *M, double phase, double t, const double *shift)
         fill_offsets(M, phase, t, shift, count, rate, n);
         lu_apply(s->mobility, count, s->mobility_order, s->offsets, 1 + n);
         for (int a = 0; a < count; a++) {
-            const double *push = push_of(fl, s->resting[a]);
             const double *off = s->offsets + (size_t)a * (1 + n);
-            for (int k = 0; k < fl->size; k++) s->along[k] = rate == 0 ? 0.0 : push[k];
-            if (rate == 0) add_rates(fl->blocks, fl->n, push, s->along);
+            fill_pull(M, s->resting[a], s->pull);
+            for (int k = 0; k < fl->size; k++) s->along[k] = rate == 0 ? 0.0 : s->pull[k];
+            if (rate == 0) add_rates(fl->blocks, fl->n, s->pull, s->along);
             for (int k = 0; k < fl->size; k++) {
                 M->w[k] -= s->along[k] * off[0];
                 for (int c = 0; c < n; c++)
@@ -218,15 +302,28 @@ static void hold(Motion *M, double phase, double t, const double *shift)
     }
 }
 
+/* let a slider slide whose speed is more than so many `roundings` */
+static void loosen_slider(const Motion *M, int s, double phase, double roundings)
+{
+    const Flow *fl = M->fl;
+    double speed = output_now(fl, s, M->w, phase).first - stop_of(fl, s)->belt;
+    double most = roundings * (rate_noise(fl, s, M->w) + SUM_ROUNDING * fabs(stop_of(fl, s)->belt));
+    if (fabs(speed) <= most) return;
+    fl->slides[s] = speed > 0.0 ? 1 : -1;
+    M->panel->na = -1; /* its equations are others now */
+}
+
 /* Leave sliders out that move as a rigid stop does on which a body rests: that holds them, and what
- * they would hold is not told. They are taken back when it lets go. */
-static void hand_over_sliders(const Motion *M)
+ * they would hold is not told. They are taken back when it lets go. What a rigid stop presses on
+ * acts as long as a body rests there. */
+static void hand_over_sliders(const Motion *M, double phase, double roundings)
 {
     const Flow *fl = M->fl;
     for (int s = 0; s < fl->n_stops; s++) {
         if (!is_slider(fl, s) || is_sprung(fl, s)) continue;
         bool acts = !is_pressed(fl, s) || M->closed[(int)stop_of(fl, s)->normal];
-        for (int r = 0; r < fl->n_stops && acts; r++) {
+        bool rubs = stop_of(fl, s)->belt != 0.0; /* what is held still slides on that */
+        for (int r = 0; r < fl->n_stops && acts && !rubs; r++) {
             if (!(is_rigid(fl, r) && M->closed[r])) continue;
             acts = !moves_with(fl, s, r);
         }
@@ -234,21 +331,15 @@ static void hand_over_sliders(const Motion *M)
         M->closed[s] = acts;
         fl->slides[s] = 0;
         M->panel->na = -1;
+        if (acts && is_pressed(fl, s)) loosen_slider(M, s, phase, roundings);
     }
 }
 
 /* let sliders slide whose speed is more than so many `roundings` */
 static void loosen_sliders(const Motion *M, double phase, double roundings)
 {
-    const Flow *fl = M->fl;
-    for (int s = 0; s < fl->n_stops; s++) {
-        if (!is_stuck(M, s)) continue;
-        double speed = output_now(fl, s, M->w, phase).first - stop_of(fl, s)->belt;
-        double most = roundings * (rate_noise(fl, s, M->w) + SUM_ROUNDING * fabs(stop_of(fl, s)->belt));
-        if (fabs(speed) <= most) continue;
-        fl->slides[s] = speed > 0.0 ? 1 : -1;
-        M->panel->na = -1; /* its equations are others now */
-    }
+    for (int s = 0; s < M->fl->n_stops; s++)
+        if (is_stuck(M, s)) loosen_slider(M, s, phase, roundings);
 }
 
 static bool any_sticks(const Motion *M)
@@ -258,8 +349,9 @@ static bool any_sticks(const Motion *M)
     return false;
 }
 
-/* let sliders slide that would need more than their friction to stick, the most loaded first */
-static void slip_overloaded(const Motion *M, double phase)
+/* let sliders slide that would need more than their friction to stick, the most loaded first; all, or
+ * those alone that rigid stops press on */
+static void slip_of(const Motion *M, double phase, bool all)
 {
     const Flow *fl = M->fl;
     for (int round = 0; round < fl->n_stops; round++) {
@@ -270,6 +362,7 @@ static void slip_overloaded(const Motion *M, double phase)
         const double *forces = M->s->stop_forces;
         for (int s = 0; s < fl->n_stops; s++) {
             if (!is_stuck(M, s)) continue;
+            if (!all && !(is_pressed(fl, s) && is_rigid(fl, (int)stop_of(fl, s)->normal))) continue;
             double normal = is_pressed(fl, s) ? forces[(int)stop_of(fl, s)->normal]
                                               : stop_of(fl, s)->pressing;
             double load = fabs(forces[s]) / (grip(fl, s) * larger(normal, 0.0));
@@ -282,6 +375,10 @@ static void slip_overloaded(const Motion *M, double phase)
         M->panel->na = -1;
     }
 }
+
+static void slip_overloaded(const Motion *M, double phase) { slip_of(M, phase, true); }
+
+static void slip_pressed(const Motion *M, double phase) { slip_of(M, phase, false); }
 
 /* let what sticks at the start of a segment slip where it would need more than its friction */
 static void begin_sliders(Motion *M)
@@ -338,7 +435,7 @@ static void close_shut(Motion *M, int first, double phase, double roundings, con
         shut = shut || depth >= -roundings * output_noise(fl, s, M->w);
         M->closed[s] = shut && fabs(at.first) <= roundings * rate_noise(fl, s, M->w);
     }
-    hand_over_sliders(M);
+    hand_over_sliders(M, phase, roundings);
     contact_forces(M, phase);
     for (int s = 0; s < fl->n_stops; s++) {
         if (!is_rigid(fl, s) || M->closed[s]) continue;
@@ -347,7 +444,54 @@ static void close_shut(Motion *M, int first, double phase, double roundings, con
         bool shut = depth >= -roundings * output_noise(fl, s, M->w);
         M->closed[s] = shut && at.first < 0.0 && is_low(M, s, -at.first, M->s->pushes[s]);
     }
-    hand_over_sliders(M);
+    hand_over_sliders(M, phase, roundings);
+}
+
+/* whether a rigid stop may hold what slides on it one way by nothing but its own friction */
+static bool may_jam(const Flow *fl, int stop)
+{
+    int slider = rubbed_by(fl, stop);
+    if (slider < 0) return false;
+    double both = fabs(between(fl, stop, slider));
+    return stop_of(fl, stop)->mobility <= stop_of(fl, slider)->friction * both;
+}
+
+/* Look for a rigid stop whose force nothing tells, or more than one, with friction: where the forces
+ * that hold the gaps would have to feed what closes them [Painlevé 1895; Génot and Brogliato 1999].
+ * Elsewhere the leading minors of the matrix of their equations are positive, as without friction. */
+static void find_undecided(Motion *M)
+{
+    Scratch *s = M->s;
+    int slid_on = -1;
+    for (int r = 0; r < M->fl->n_stops; r++)
+        if (M->closed[r] && sliding_with(M, r) >= 0) slid_on = r;
+    int n = slid_on >= 0 ? held_stops(M, true) : 0;
+    double *matrix = s->mobility;
+    for (int a = 0; a < n; a++)
+        for (int b = 0; b < n; b++) matrix[a * n + b] = taken_by(M, s->resting[a], s->resting[b]);
+    for (int p = 0; p < n; p++) {
+        if (!(matrix[p * n + p] > 0.0)) {
+            M->undecided = is_rigid(M->fl, s->resting[p]) ? s->resting[p] : slid_on;
+            return;
+        }
+        for (int a = p + 1; a < n; a++)
+            for (int b = n - 1; b >= p; b--)
+                matrix[a * n + b] -= matrix[a * n + p] / matrix[p * n + p] * matrix[p * n + b];
+    }
+}
+
+/* the same of a rigid stop that jams where nothing presses a body on: whether that holds or leaves
+ * it is not told */
+static void find_jammed(Motion *M, double phase)
+{
+    const Flow *fl = M->fl;
+    const double *forces = M->s->stop_forces;
+    for (int r = 0; r < fl->n_stops; r++) {
+        if (!(is_rigid(fl, r) && M->closed[r] && may_jam(fl, r))) continue;
+        int slider = rubbed_by(fl, r);
+        double pressed = stop_of(fl, r)->mobility * forces[r] + between(fl, r, slider) * forces[slider];
+        if (pressed <= 0.0 && slip_at(M, slider, phase) == 0.0) M->undecided = r;
+    }
 }
 
 /* Close the rigid stops on which the body rests now and open the others. A gap and a rate of so
@@ -359,7 +503,11 @@ static void settle(Motion *M, int first, double phase, double t, const double *s
     const Flow *fl = M->fl;
     close_shut(M, first, phase, roundings, struck);
     for (int round = 0; round < fl->n_stops; round++) {
+        slip_pressed(M, phase);
+        find_undecided(M);
         contact_forces(M, phase);
+        find_jammed(M, phase);
+        if (M->undecided >= 0) return;
         const double *forces = M->s->stop_forces;
         int weakest = -1;
         for (int s = 0; s < fl->n_stops; s++) {
@@ -368,7 +516,7 @@ static void settle(Motion *M, int first, double phase, double t, const double *s
         }
         if (weakest < 0) break;
         M->closed[weakest] = false;
-        hand_over_sliders(M);
+        hand_over_sliders(M, phase, roundings);
     }
     hold(M, phase, t, shift);
 }

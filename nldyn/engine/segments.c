@@ -94,7 +94,7 @@ static void pass_event(Motion *M, int event, double h)
     } else if (is_rigid(M->fl, event)) {
         if (M->closed[event]) {
             M->closed[event] = false;
-            hand_over_sliders(M);
+            hand_over_sliders(M, here, SHUT);
             slip_overloaded(M, here);
         } else {
             impact(M, event, true, here, M->t);
@@ -109,6 +109,7 @@ static void pass_event(Motion *M, int event, double h)
     if (!any_sprung(M->fl)) return;
     contact_forces(M, here);
     load_springs(M, here, M->t, SHUT, 10.0 * coarsest_instant(M->fl) * h, event);
+    if (M->undecided < 0) find_undecided(M);
 }
 
 /* fly to the first contact or to the end */
@@ -274,6 +275,7 @@ static int run_pieces(Motion *M)
     for (int piece = 0; piece < MOST_PIECES; piece++) {
         if (M->duration - M->t <= 0.0) return OK;
         if (interrupted(fl->watch)) return INTERRUPTED;
+        if (M->undecided >= 0) return UNDECIDED;
         double here = M->phase + fl->omega * M->t;
         int na = 0;
         for (int s = 0; s < fl->n_stops; s++) {
@@ -375,6 +377,7 @@ static int propagate(Motion *M, const double *start, double phase, double durati
     M->duration = duration;
     begin_state(M, start);
     for (int s = 0; s < M->fl->n_stops; s++) M->bounces[s] = 0;
+    M->undecided = -1;
     begin_contacts(M);
     begin_on_rigid_stops(M);
     begin_sliders(M);

@@ -133,6 +133,9 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     s->moved_shift = numbers(block, n_columns);
     s->along = numbers(block, size);
     s->along_columns = numbers(block, n_columns);
+    s->closing = numbers(block, n_columns);
+    s->sliding = numbers(block, n_columns);
+    s->pull = numbers(block, size);
     s->offsets = numbers(block, na * (1 + n_columns));
     s->struck = flags(block, na);
     s->still = flags(block, na);

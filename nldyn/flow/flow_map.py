@@ -40,6 +40,7 @@ from nldyn.engine.layout import (
     SLIDING_TURNS,
     TOO_MANY_PIECES,
     TOO_MANY_STEPS,
+    UNDECIDED,
     Record,
     StopRow,
     SystemData,
@@ -82,6 +83,9 @@ _REASONS = {
     OTHER_CONTACTS: "the number of contacts changes within the step",
     SLIDING_TURNS: "the whirl takes the sliding speed in a round clearance through zero: there the "
     "surface would stick or slide the other way, which is not known",
+    UNDECIDED: "friction at the rigid stop at '{at}' (stop {stop}) is so large that no force, or "
+    "more than one, holds what rests on it at phase {phase:.6g} rad: what happens there is not "
+    "decided (Painlevé's paradox)",
 }
 
 
@@ -461,7 +465,7 @@ class FlowMap:
         found = self._fly(
             self.no_record, False, nodes, phases, omega, chained, sensitivities, parameters
         )
-        return Segments(*found[5:], self._reason(found.outcome))
+        return Segments(*found[5:], self._reason(found))
 
     def error(
         self,
@@ -662,10 +666,15 @@ class FlowMap:
             return found._replace(closings=found.closings[: len(self.system.stops)])
         return found
 
-    def _reason(self, status: int) -> str:
+    def _reason(self, found: Found) -> str:
         """Why the engine gave up; empty if they did not."""
+        status = found.outcome
         if status == OK:
             return ""
+        if status == UNDECIDED:
+            number = int(found.first)
+            stop = self.system.rigid_stops[number]
+            return _REASONS[status].format(at=stop.at, stop=number, phase=found.last)
         softens = any(bond.coefficients and not bond.bounded for bond in self.system.bonds)
         if status == CONTACT_FAILED and softens:
             return "the motion runs away along a spring that softens"
@@ -683,7 +692,7 @@ class FlowMap:
 
     def _motion(self, omega: float, rec: Record, found: Found) -> Trajectory:
         """The motion in a record, of which only the used part is kept."""
-        return Trajectory(self, omega, rec.kept(), found.closings, self._reason(found.outcome))
+        return Trajectory(self, omega, rec.kept(), found.closings, self._reason(found))
 
     @cached_property
     def finer(self) -> FlowMap:

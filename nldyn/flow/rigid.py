@@ -1,8 +1,7 @@
-"""Impacts of a recorded motion with rigid stops, and the forces while it rests on them."""
+"""Series of impacts with rigid stops in a recorded motion, and the forces of rest on them."""
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,36 +9,13 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.flow.flow_map import FlowMap, Trajectory
+from nldyn.flow.rigid_impacts import RigidImpacts, rigid_impacts, states_before
 from nldyn.flow.sliding import held_in_pieces
 from nldyn.system.friction import Slider
 from nldyn.system.round_stop import RoundStop
 
-SHUT = 1e-13  # of the displacements that add up to that at a stop: a gap counts as closed
 BEHIND = 1e-9  # of them: depth of a state that lies behind a rigid stop
 STILL = 1e-9  # of the largest speed at a stop: one that counts as none
-
-
-class RigidImpacts(NamedTuple):
-    """Impacts with a rigid stop, in the order of time.
-
-    Parameters
-    ----------
-    piece : (k,)
-        Pieces of the record that begin with them.
-    phase : (k,)
-        Forcing phases.
-    speed, rebound : (k,)
-        Speeds in m/s at which the gap closes before, and opens after.
-    """
-
-    piece: NDArray[np.intp]
-    phase: Real
-    speed: Real
-    rebound: Real
-
-    def impulse(self, mobility: float) -> Real:
-        """Impulses (k,) in N s, by the mobility of the stop in 1/kg."""
-        return (self.speed + self.rebound) / mobility
 
 
 def behind_rigid_stops(flow: FlowMap, states: Real) -> NDArray[np.bool_]:
@@ -65,36 +41,6 @@ def before_rigid_stops(flow: FlowMap, states: Real) -> Real:
         across = np.linalg.pinv(flow.rows[rigid]) @ flow.rows[rigid]
         states[behind] -= states[behind] @ across.T
     return states
-
-
-def states_before(motion: Trajectory, pieces: NDArray[np.intp]) -> Real:
-    """States z (k, 2n) at the ends of what comes before some pieces of a motion.
-
-    Those of the record: solved anew, an impact may come a rounding earlier, and be over.
-    """
-    return motion.recorded_states(np.nextafter(motion.record.phase[pieces], -math.inf))
-
-
-def rigid_impacts(motion: Trajectory, stop: int) -> RigidImpacts:
-    """The impacts of a motion with one of its rigid stops.
-
-    Those that end in rest, ever faster, are told as far as the flow map follows them.
-    """
-    flow, rec = motion.flow, motion.record
-    after = 1 + np.flatnonzero(np.isin(rec.event[:-1], list(flow.system.rigid_stops)))
-    if not after.size:
-        return RigidImpacts(after, *np.empty((3, 0)))
-    before = states_before(motion, after)
-    row, rate = flow.rows[stop], flow.rate_rows[stop]
-    gap = flow.system.stops[stop].gap
-    depth = rec.start[after] @ row - gap
-    speed, rebound = before @ rate, -(rec.start[after] @ rate)
-    size = (np.abs(rec.start) @ np.abs(row)).max() + gap
-    size += motion.flow.response(motion.omega).size(motion.omega) * np.abs(row).sum()
-    fastest = max(np.abs(rec.start @ rate).max(), np.abs(speed).max())
-    hit = (np.abs(depth) <= SHUT * size) & (speed > STILL * fastest)
-    hit &= speed + rebound > STILL * speed
-    return RigidImpacts(after[hit], rec.phase[after[hit]], speed[hit], rebound[hit])
 
 
 def impacts_in_order(motion: Trajectory) -> list[tuple[int, float]]:
@@ -198,11 +144,16 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
         else:
             rates -= pushed[:, None] * data.force[:, i]
     first = len(system.stops)
+    rubs = np.zeros((len(phases), first))  # friction per unit of the force of a rigid stop
     holds = np.zeros((len(phases), len(system.sliders)), dtype=bool)
     for i, slider in enumerate(system.sliders, first):
         friction = rec.force[piece, i]
         acts, sticks = friction.any(axis=1), held_in_pieces(motion, i - first)[piece]
         holds[:, i - first] = acts & sticks
+        if slider.stop in system.rigid_stops:
+            way = np.sign(friction.sum(axis=1)) * slider.friction.coefficient
+            rubs[:, slider.stop] = np.where(acts & ~sticks, way, 0.0)
+            continue
         normal = _normal_force(flow, slider, states)
         if slider.tangential_stiffness is not None:
             most = slider.friction.coefficient * normal
@@ -221,7 +172,12 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
     mobility = rows @ data.force[:, acting]
     for k in np.flatnonzero(rests.any(axis=1)):
         held = np.flatnonzero(np.r_[rests[k], holds[k]])
-        found = np.linalg.solve(mobility[np.ix_(held, held)], pace[k, held])
+        taken = mobility.copy()
+        for i, slider in enumerate(system.sliders):
+            if slider.stop in system.rigid_stops:
+                place = int(np.searchsorted(rigid, slider.stop))
+                taken[:, place] += rubs[k, slider.stop] * mobility[:, rigid.size + i]
+        found = np.linalg.solve(taken[np.ix_(held, held)], pace[k, held])
         forces[k, rigid[held[held < rigid.size]]] = found[held < rigid.size]
     return forces
 

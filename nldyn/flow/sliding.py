@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.flow.flow_map import FlowMap, Trajectory
 from nldyn.flow.gauss import SMOOTH, fine_table, peaks
+from nldyn.flow.rigid_impacts import rigid_impacts, rubbed
 from nldyn.system.friction import Slider
 
 UNMOVED = 1e-9  # of the largest displacement: a way that counts as none where a slider is held
@@ -41,7 +42,8 @@ class SliderMeasures:
     loss : float
         Energy in J that friction dissipates: the integral of friction times the speed of sliding.
     pressed_distance : float
-        Integral of the normal force times the speed of sliding, in N m: by Archard's law what
+        Integral of the normal force times the speed of sliding, in N m, with that of the impulses
+        of impacts on rigid stops, as in `loss`: by Archard's law what
         wears off is this times a coefficient of wear over the hardness.
     power : float
         `loss` per second, in W.
@@ -130,6 +132,10 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
     pressed = rec.force[panels[slides], slider.stop] if slider.stop >= 0 else slider.normal_force
     time, loss = float(rec.duration.sum()), float((force[slides] * moved).sum())
     pressed_distance = float(np.abs(pressed * moved).sum())
+    if slider.stop in flow.system.rigid_stops:
+        in_impacts = float(rubbed(flow, number, rigid_impacts(motion, slider.stop)).sum())
+        loss += slider.friction.coefficient * in_impacts
+        pressed_distance += in_impacts
     forces = force @ fine_table(tables.nodes.size).T
     return SliderMeasures(
         slider,

@@ -114,10 +114,10 @@ def _told_friction(system: System) -> dict[str, Any]:
                 stop.tangent,
                 stop.tangent_against,
                 astuple(stop.friction),
-                stop.tangential_stiffness,
+                getattr(stop, "tangential_stiffness", None),
             ]
             for place, stop in enumerate(system.stops)
-            if isinstance(stop, Stop) and isinstance(stop.friction, Friction)
+            if not isinstance(stop, RoundStop) and isinstance(stop.friction, Friction)
         },
         "dampers": {
             place: [
@@ -214,7 +214,8 @@ def _with_friction(
         told = json.loads(group.text("friction"))
         for place, (tangent, against, law, *spring) in told["stops"].items():
             own = {"tangent": tangent, "tangent_against": against, "friction": Friction(*law)}
-            own["tangential_stiffness"] = spring[0] if spring else None  # or of an earlier version
+            if spring and spring[0] is not None:  # earlier versions do not tell it
+                own["tangential_stiffness"] = spring[0]
             rough[int(place)] = replace(rough[int(place)], **own)
         for place, (at, normal, law, *ends) in told["dampers"].items():
             all_dampers.insert(int(place), DryFriction(at, normal, Friction(*law), *ends))

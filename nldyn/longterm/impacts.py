@@ -14,7 +14,7 @@ from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.base.optional import optional
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.gauss import fine_table, peaks
-from nldyn.flow.rigid import rigid_impacts
+from nldyn.flow.rigid_impacts import compression_works, normal_losses, rigid_impacts
 from nldyn.longterm.simulation import Motion, end_state, motion_of
 from nldyn.orbits.orbit import Orbit
 from nldyn.system.naming import turned
@@ -346,15 +346,16 @@ def _turns(motion: Motion, stop: int) -> bool:
 
 def _of_rigid_stop(motion: Motion, stop: int) -> dict[str, NDArray[Any]]:
     """Columns of the impacts with a rigid stop, which take no time and no way."""
-    c = motion.system.stop_vector(motion.system.stops[stop])
-    mass = 1.0 / float(c @ c)
     parts = []
     for begin, stretch in zip(motion.begins, motion.stretches, strict=False):
         hits = rigid_impacts(stretch, stop)
         time = begin + (hits.phase - stretch.record.phase[0]) / stretch.omega
         hz = np.full(time.shape, stretch.omega / (2.0 * np.pi))
-        parts.append(np.array([time, hits.phase, hits.speed, hits.rebound, hz]))
-    time, phase, speed, rebound, hz = np.concatenate(parts, axis=1)
+        loss = normal_losses(stretch.flow, stop, hits)
+        work = compression_works(stretch.flow, stop, hits)
+        each = (time, hits.phase, hits.speed, hits.rebound, hits.impulse, work, loss, hz)
+        parts.append(np.array(each))
+    time, phase, speed, rebound, impulse, work, loss, hz = np.concatenate(parts, axis=1)
     none = np.zeros(time.shape)
     return {
         "stop": np.full(time.shape, stop, dtype=np.int64),
@@ -366,9 +367,9 @@ def _of_rigid_stop(motion: Motion, stop: int) -> dict[str, NDArray[Any]]:
         "rebound_speed": rebound,
         "penetration": none,
         "peak_force": np.full(time.shape, np.nan),
-        "impulse": mass * (speed + rebound),
-        "work": 0.5 * mass * speed**2,
-        "loss": 0.5 * mass * (speed**2 - rebound**2),
+        "impulse": impulse,
+        "work": work,
+        "loss": loss,
         "frequency_hz": hz,
     }
 

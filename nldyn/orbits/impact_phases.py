@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
-from nldyn.flow.rigid import rigid_impacts, series_to_rest
+from nldyn.flow.rigid import series_to_rest
+from nldyn.flow.rigid_impacts import rigid_impacts
 from nldyn.orbits.orbit import Orbit
 
 STARTS = 32  # first phases of shooting among which the one farthest from all impacts is chosen

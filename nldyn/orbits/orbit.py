@@ -19,9 +19,9 @@ from nldyn.flow.rigid import (
     impacts_in_order,
     rest_forces,
     rests_on_rigid_stop,
-    rigid_impacts,
     series_to_rest,
 )
+from nldyn.flow.rigid_impacts import rigid_impacts
 from nldyn.flow.sliding import SliderMeasures, slider_measures
 from nldyn.orbits.areas import AreaMeasures, area_measures
 from nldyn.orbits.critical_functions import Critical
@@ -587,9 +587,8 @@ class Orbit:
     def _rigid_list(self, index: int) -> list[Impact]:
         """Impacts with a rigid stop."""
         hits = rigid_impacts(self.trajectory, index)
-        c = self.system.stop_vector(self.system.stops[index])
         keep = ~series_to_rest(self.trajectory, index, hits).follows
-        columns = (hits.phase / self.omega, hits.speed, hits.impulse(float(c @ c)))
+        columns = (hits.phase / self.omega, hits.speed, hits.impulse)
         return [
             Impact(index, time, 0.0, None, speed, impulse)
             for time, speed, impulse in zip(*(each[keep].tolist() for each in columns), strict=True)

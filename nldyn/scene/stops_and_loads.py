@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from nldyn.scene.schema.loads import AnyExcitationTable, MeasuredTable
 from nldyn.scene.schema.scene import Scene
 from nldyn.system.loads import Excitation
 from nldyn.system.measured import MeasuredForce, measured_force
-from nldyn.system.rigid_stop import AnyStop
+from nldyn.system.rigid_stop import AnyStop, RigidStop
 from nldyn.system.stop import Stop
 from nldyn.system.system import Elements
 
@@ -73,14 +74,18 @@ def _rough(scene: Scene, stops: list[AnyStop]) -> tuple[AnyStop, ...]:
             fault = f"is {table.stop}, but no stop has that number; {known}"
             raise scene_error(scene.file, ("friction", number, "stop"), fault)
         stop = stops[table.stop]
-        if not isinstance(stop, Stop) or stop.friction is not None:
-            fault = "is one that has friction already" if isinstance(stop, Stop) else "is rigid"
-            fault += ": give each stop one friction" if isinstance(stop, Stop) else ", without any"
+        assert isinstance(stop, Stop | RigidStop)
+        if stop.friction is not None:
+            fault = "is one that has friction already: give each stop one friction"
             raise scene_error(scene.file, ("friction", number, "stop"), fault)
-        stops[table.stop] = replace(
-            stop, tangent=table.at, friction=table.of_coulomb, tangent_against=table.against,
-            tangential_stiffness=table.tangential_stiffness,
-        )  # fmt: skip
+        rough: dict[str, Any] = {"tangent": table.at, "tangent_against": table.against}
+        rough["friction"] = table.of_coulomb
+        if isinstance(stop, Stop):
+            rough["tangential_stiffness"] = table.tangential_stiffness
+        elif table.tangential_stiffness is not None:
+            fault = f"needs no tangential_stiffness: stop {table.stop} is rigid"
+            raise scene_error(scene.file, ("friction", number, "tangential_stiffness"), fault)
+        stops[table.stop] = replace(stop, **rough)
     return tuple(stops)
 
 

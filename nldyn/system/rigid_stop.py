@@ -30,6 +30,15 @@ class RigidStop:
     Where several rigid stops are hit at once, impacts follow each other within the instant, the
     fastest first, until no gap closes: energy never grows.
 
+    With friction an impact has an impulse along `tangent`, too, by Coulomb's law at each instant of
+    it: what slides takes μ times the normal impulse, until it sticks, or slides back where the
+    normal impulse drives it. Compression ends where the gap closes no more; the whole normal
+    impulse is 1 + e times the one up to there, which is Poisson's hypothesis, by Routh's method. It
+    takes energy out in every case, which Newton's hypothesis (the rebound is e v) does not where
+    normal and tangent are coupled. Where they are not, as at a block on a table, they agree.
+    On the stop it sticks, or slides at μ times the force of rest. Where a large μ leaves no force
+    or several (Painlevé), the flow map fails with a sentence that names the stop and the phase.
+
     Parameters
     ----------
     at : str
@@ -45,7 +54,7 @@ class RigidStop:
     against : str, optional
         Interface on the other side; the ground unless given.
     tangent, friction, tangent_against : optional
-        As for a `Stop`; for points without mass alone, see `System.from_reduced`.
+        As for a `Stop`. The coefficient is one, at rest and sliding.
 
     Raises
     ------
@@ -55,7 +64,10 @@ class RigidStop:
     References
     ----------
     S. W. Shaw, P. J. Holmes (1983), *J. Sound Vib.* 90, 129-155; F. Pfeiffer, C. Glocker (1996),
-    *Multibody Dynamics with Unilateral Contacts*, ch. 8.
+    *Multibody Dynamics with Unilateral Contacts*, ch. 8. For friction E. J. Routh (1905), *Dynamics
+    of a System of Rigid Bodies, Elementary Part*, ch. 4; T. R. Kane, D. A. Levinson (1985),
+    *Dynamics: Theory and Applications*; Y. Wang, M. T. Mason (1992), *J. Appl. Mech.* 59, 635-642;
+    F. Génot, B. Brogliato (1999), *Eur. J. Mech. A/Solids* 18, 653-677.
 
     Examples
     --------
@@ -104,7 +116,8 @@ class RigidStop:
     @property
     def depends_on_speed(self) -> bool:
         """Whether an impact takes energy out."""
-        return callable(self.restitution) or self.restitution != 1.0
+        loses = callable(self.restitution) or self.restitution != 1.0
+        return loses or self.friction is not None
 
     def determinant(self, speed: float) -> float:
         """Factor e (e + v de/dv) by which an impact at a speed changes volumes of states.

@@ -449,10 +449,12 @@ class System:
                 stop.tangent_against,
                 stop.friction,
                 number,
-                tangential_stiffness=stop.tangential_stiffness,
+                tangential_stiffness=getattr(stop, "tangential_stiffness", None),
             )
-            for number, stop in self.elastic_stops.items()
-            if isinstance(stop.friction, Friction) and stop.tangent is not None
+            for number, stop in enumerate(self.stops)
+            if not isinstance(stop, RoundStop)
+            and isinstance(stop.friction, Friction)
+            and stop.tangent is not None
         ]
         dry = [d for d in self.dampers if isinstance(d, DryFriction)]
         return (
@@ -915,7 +917,7 @@ class System:
         if slider.stop >= 0:
             stops = list(self.stops)
             pressing = stops[slider.stop]
-            assert isinstance(pressing, Stop)
+            assert isinstance(pressing, Stop | RigidStop)
             stops[slider.stop] = replace(pressing, **change)
             return self.with_elements(stops=tuple(stops))
         dry = [i for i, damper in enumerate(self.dampers) if isinstance(damper, DryFriction)]
@@ -947,17 +949,25 @@ class System:
 
     def _check_sliders(self) -> None:
         """Refuse sliders that hold one motion together: what each holds would not be told."""
-        for stop in self.rigid_stops.values():
-            if stop.friction is not None:
-                raise SystemModelError(
-                    f"rigid stop at '{stop.at}': friction needs a point without mass, see "
-                    "cms.reduce with method 'macneal' and massless"
-                )
         for slider in (self.sliders[number] for number in self.sprung):
             if not np.any(self.vector_between(slider.at, slider.against)):
                 raise SystemModelError(
                     f"friction at '{slider.at}' acts on no motion: none of the {self.size} modes "
                     "moves there"
+                )
+        for stop in self.rigid_stops.values():
+            if not isinstance(stop.friction, Friction) or stop.tangent is None:
+                continue
+            if stop.friction.adhesion:
+                raise SystemModelError(
+                    f"friction of a rigid stop has one coefficient, at rest and sliding: at "
+                    f"'{stop.at}' leave out at_rest and fading_speed, or give the stop a stiffness"
+                )
+            along = self.vector_between(stop.tangent, stop.tangent_against)
+            if _rank([self.stop_vector(stop), along], self.size) < 2:
+                raise SystemModelError(
+                    f"friction at '{stop.tangent}' acts on no motion along the rigid stop at "
+                    f"'{stop.at}': in the {self.size} modes both are one motion, or none"
                 )
         for together in self._sliders_at_once() if self.sliders else ():
             rows = [self.vector_between(s.at, s.against) for s in together]

@@ -88,7 +88,7 @@ def test_a_spring_before_friction_may_change(tmp_path):
         ({"base_speed = 0.2": "tangential_stiffness = 0.0"}, "tangential_stiffness"),
         ({"stop = 0": ""}, "needs one of 'normal_force' and 'stop'"),
         ({"stop = 0": "stop = 0\nnormal_force = 1.0"}, "has both 'normal_force' and 'stop'"),
-        ({"stop = 0": "stop = 1"}, "is rigid"),
+        ({"stop = 0": "stop = 1"}, "friction of a rigid stop has one coefficient"),
         ({"stop = 0": "stop = 2"}, "no stop has that number; there are 2"),
         ({"fading_speed = 0.1": ""}, "needs a 'fading_speed'"),
         ({"at_rest = 0.4": "at_rest = 0.2"}, "'at_rest' of at least"),

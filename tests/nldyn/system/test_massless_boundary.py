@@ -296,10 +296,11 @@ def test_the_example_of_the_page_runs(capsys):
     assert said[1].endswith(", stable>")
 
 
-def test_friction_at_a_rigid_stop_needs_a_point_without_mass():
-    stop = RigidStop("x", 1.0, tangent="y", friction=0.3)
-    with pytest.raises(SystemModelError, match="friction needs a point without mass"):
-        System.from_modal([1.0, 2.0], {"x": [1.0, 0.0], "y": [0.0, 1.0]}, stops=[stop])
+def test_friction_of_a_rigid_stop_needs_both_directions_with_mass_or_none():
+    reduced = cms.reduce(two_chains(), modes=6, method="macneal", massless=["across", "along"])
+    stop = RigidStop("push", 1.0, tangent="along", friction=0.3)
+    with pytest.raises(SystemModelError, match="acts along 'along', which has no mass"):
+        System.from_reduced(reduced, stops=[stop])
     with pytest.raises(SystemModelError, match="friction needs both friction and tangent"):
         RigidStop("x", 1.0, friction=0.3)
 
