@@ -119,8 +119,8 @@ class MasslessBoundary:
         if isinstance(stop, RigidStop):
             if give == 0.0 and self.between(*[(stop.tangent, stop.tangent_against)] * 2) != 0.0:
                 raise SystemModelError(
-                    f"rigid stop at '{stop.at}': its friction acts along '{stop.tangent}', which has "
-                    "no mass: then it must have none itself, or reduce by 'rubin'"
+                    f"rigid stop at '{stop.at}': its friction acts along '{stop.tangent}', which "
+                    "has no mass: then it must have none itself, or reduce by 'rubin'"
                 )
             return stop if give == 0.0 else self._closed(stop, give)
         stiffness = stop.stiffness if give == 0.0 else self._series(stop, give)

@@ -1,6 +1,7 @@
 """Friction at rigid stops: closed forms, Routh's impacts, and an independent integration."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -378,7 +379,7 @@ def test_a_branch_in_the_friction_and_its_file(tmp_path):
 )
 def test_bad_numbers_are_refused_in_a_sentence(changes, words):
     with pytest.raises(SystemModelError, match=words):
-        block(0.5, 0.2).with_elements(stops=(RigidStop("y", 0.5, **changes),))
+        replace(block(0.5, 0.2), stops=(RigidStop("y", 0.5, **changes),))
 
 
 def test_a_tangent_along_the_normal_is_refused():
