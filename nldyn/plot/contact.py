@@ -119,7 +119,7 @@ def plot_friction_loss(
     >>> system = System.from_modal([1.0, 2.0], {"x": [1.0, 0.0], "y": [0.5, 1.0]},
     ...     modal_damping=0.05, dampers=joint, excitation=[HarmonicForce("x", 10.0)])
     >>> plot_friction_loss(solve_orbit(system, 0.7)).get_xlabel()
-    'energy dissipated in a period (J)'
+    'energy dissipated in a period (mJ)'
     """
     _check(orbit, ax, area, measure)
     lost = {each.slider.stop: each.loss for each in orbit.friction if each.slider.stop >= 0}
