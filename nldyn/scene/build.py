@@ -15,6 +15,7 @@ from scipy.sparse.linalg import spsolve
 
 import cms
 import fem
+from cms.reduction.boundary import told_of_massless
 from cms.reduction.doubt import check_unreduced
 from cms.reduction.seen import told_of_seen
 from fem.assembly.component import MOST_ERROR, CurvedCellsWarning
@@ -226,6 +227,7 @@ def build_reduced(
             method=table.method,
             residual=table.residual,
             unseen=coupled,
+            massless=table.massless or None,
             progress=logger.info if component.mass.shape[0] > LARGE else None,
         )
         if pieces > 1 and reduced.rigid_body_modes:
@@ -238,7 +240,11 @@ def build_reduced(
                 "" if getattr(component, "damping", None) is not None else "; they change nothing"
             )
             logger.info(f"kept modes that no interface can see: {numbers}{alone}")
-        for sentence in (*told_of_seen(reduced, table.modes), *told_of_areas(scene, reduced)):
+        for sentence in (
+            *told_of_seen(reduced, table.modes),
+            *told_of_massless(reduced),
+            *told_of_areas(scene, reduced),
+        ):
             logger.info(sentence)
         return reduced
 

@@ -46,9 +46,12 @@ class ReductionTable(Table):
     [reduction_studies.md](../how-to/reduction_studies.md)."""
     residual: bool = True
     """`false` is short for `method = "truncation"`."""
-    method: Literal["rubin", "craig-bampton", "guyan", "truncation"] = "rubin"
-    """`"rubin"`, `"craig-bampton"`, `"guyan"` (takes none of these three) or `"truncation"`;
-    see [cms.md](cms.md)."""
+    method: Literal["rubin", "craig-bampton", "guyan", "macneal", "truncation"] = "rubin"
+    """`"rubin"`, `"craig-bampton"`, `"guyan"` (takes none of these three), `"macneal"` (needs
+    `massless`) or `"truncation"`; see [cms.md](cms.md)."""
+    massless: list[str] = []
+    """Interfaces where stops alone act, whose points carry no mass:
+    [rigid contact without mass](../how-to/massless_boundary.md)."""
 
     @model_validator(mode="after")
     def _one_choice(self) -> ReductionTable:
@@ -56,9 +59,11 @@ class ReductionTable(Table):
             raise ValueError("has 'residual = false', which is method 'truncation'; keep one")
         if self.method == "guyan":
             names = ("modes", "cutoff_hz", "tolerance")
-            refuse(self, names, "method 'guyan', which keeps no modes")
+            refuse(self, (*names, "massless"), "method 'guyan', which keeps no modes")
             return self
         exactly_one(self, "modes", "cutoff_hz", "tolerance")
+        if (self.method == "macneal") != bool(self.massless):
+            raise ValueError("needs both method = \"macneal\" and 'massless', or neither")
         if not self.residual or self.method != "rubin":
             refuse(self, ("tolerance",), "methods other than 'rubin'")
         return self
