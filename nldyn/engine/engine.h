@@ -207,6 +207,7 @@ typedef struct {
     bool round;       /* whether there are any */
     double *radial;   /* (na, m) their penetrations, at the place of the first direction */
     double *there;    /* (n, 4, m) exp(A t_i) */
+    double *home;     /* (n, 4, m) exp(-A t_j) */
     double *to;       /* (outputs, 2n, m) row exp(A t_i) */
     double *back;     /* (na, 2n, m) exp(-A t_j) force */
     double *G;        /* (na m, outputs m) outputs at the nodes per force at the nodes, by forces */
@@ -238,7 +239,7 @@ typedef struct {
     double *viscosity, *off, *hold_matrix, *shift, *kick; /* hold_speeds */
     int *hold_order;
     double *forces, *part, *change;                    /* panel_columns */
-    double *pushed, *carried, *added, *part_many, *flown; /* panels of many stops */
+    double *pushed, *carried, *added, *driven_many, *flown, *pushing, *showing; /* many stops */
     double *stop_forces, *pushes, *first_pushes, *held, *mobility; /* rigid stops */
     double *drags; /* (n_stops,) speeds of the places of sliders behind springs, see `drag_speed` */
     int *resting, *mobility_order;

@@ -87,51 +87,65 @@ static bool solve_many(const Flow *fl, const Gauss *tab, const double *noise, Pa
     return false;
 }
 
+/* fill s->pushing (na, 2n) with what the stops' forces do to the modes in the length of the panel,
+ * and s->showing (outputs, 2n) with what the modes do to its outputs */
+static void gather_stops(const Flow *fl, const Panel *panel, Scratch *s)
+{
+    int na = panel->na, size = fl->size;
+    for (int o = 0; o < panel->outputs; o++) {
+        int stop = panel->active[o % na];
+        const double *row = row_of(fl, output_order(fl, stop, o / na), stop);
+        memcpy(s->showing + (size_t)o * size, row, sizeof(double) * size);
+    }
+    for (int a = 0; a < na; a++)
+        for (int k = 0; k < size; k++)
+            s->pushing[a * size + k] = -panel->made_length * push_of(fl, panel->active[a])[k];
+}
+
+/* move the pairs of coordinates in X (2n, m, n_columns), at each node by a matrix of its own; blocks
+ * (n, 4, m) */
+static void move_nodes(const Flow *fl, const double *blocks, int m, int n_columns, double *X)
+{
+    for (int b = 0; b < fl->n; b++, blocks += 4 * m) {
+        double *first = X + (size_t)2 * b * m * n_columns, *second = first + (size_t)m * n_columns;
+        for (int i = 0; i < m; i++) {
+            Square by = {blocks[i], blocks[m + i], blocks[2 * m + i], blocks[3 * m + i]};
+            move_rows(by, first + i * n_columns, second + i * n_columns, n_columns);
+        }
+    }
+}
+
 /* fill s->flown (2n, m, n_columns): `carry_modes` of columns of forces (na, m, n_columns) */
 static void carry_columns(const Flow *fl, const Gauss *tab, const Panel *panel, int n_columns,
                           const double *forces, Scratch *s)
 {
-    int m = panel->m, size = fl->size;
-    size_t row = (size_t)m * n_columns;
+    int m = panel->m, size = fl->size, row = m * n_columns;
     const double *integrate = tab->integrate + (size_t)panel->made_kind * m * m;
-    for (int k = 0; k < size; k++) {
-        memset(s->part_many, 0, sizeof(double) * row);
-        for (int a = 0; a < panel->na; a++)
-            for (int j = 0; j < m; j++) {
-                double back = panel->back[((size_t)a * size + k) * m + j];
-                const double *restrict from = forces + a * row + (size_t)j * n_columns;
-                double *restrict to = s->part_many + (size_t)j * n_columns;
-                for (int c = 0; c < n_columns; c++) to[c] += back * from[c];
-            }
-        double *flown_to = s->flown + k * row;
-        memset(flown_to, 0, sizeof(double) * row);
-        for (int i = 0; i < m; i++)
-            for (int j = 0; j < m; j++) {
-                double weight = -panel->made_length * integrate[j * m + i];
-                const double *restrict from = s->part_many + (size_t)j * n_columns;
-                double *restrict to = flown_to + (size_t)i * n_columns;
-                for (int c = 0; c < n_columns; c++) to[c] += weight * from[c];
-            }
-    }
+    multiply_transposed(fl->watch, s->pushing, size, forces, s->driven_many, size, panel->na, row);
+    move_nodes(fl, panel->home, m, n_columns, s->driven_many);
+    for (int k = 0; k < size; k++)
+        multiply_transposed(fl->watch, integrate, m, s->driven_many + (size_t)k * row,
+                            s->flown + (size_t)k * row, m, m, n_columns);
 }
 
-/* fill `next` (na, m, n_columns) with what the forces' slopes make of s->flown */
+/* fill `next` (na, m, n_columns) with what the forces' slopes make of s->flown, which it moves to
+ * the nodes */
 static void slopes_of_columns(const Flow *fl, const Panel *panel, int n_columns, double *next,
-                              const Scratch *s)
+                              Scratch *s)
 {
-    int na = panel->na, m = panel->m, size = fl->size;
-    size_t row = (size_t)m * n_columns;
+    int na = panel->na, m = panel->m, size = fl->size, row = m * n_columns;
+    move_nodes(fl, panel->there, m, n_columns, s->flown);
     memset(next, 0, sizeof(double) * na * row);
-    for (int o = 0; o < panel->outputs; o++)
-        for (int i = 0; i < m; i++) {
-            double slope = panel->slope[o * m + i];
-            double *restrict to = next + (o % na) * row + (size_t)i * n_columns;
-            for (int k = 0; k < size && slope != 0.0; k++) {
-                double share = slope * panel->to[((size_t)o * size + k) * m + i];
-                const double *restrict from = s->flown + k * row + (size_t)i * n_columns;
-                for (int c = 0; c < n_columns; c++) to[c] += share * from[c];
-            }
+    for (int first = 0; first < panel->outputs; first += na) {
+        multiply(fl->watch, s->showing + (size_t)first * size, s->flown, s->driven_many, na, size,
+                 row);
+        for (int p = 0; p < na * m; p++) {
+            double slope = panel->slope[first * m + p];
+            const double *restrict from = s->driven_many + (size_t)p * n_columns;
+            double *restrict to = next + (size_t)p * n_columns;
+            for (int c = 0; c < n_columns; c++) to[c] += slope * from[c];
         }
+    }
     add_friction(fl, panel, next, n_columns, 1, n_columns);
 }
 
@@ -151,6 +165,7 @@ static void solve_columns(const Flow *fl, const Gauss *tab, const Panel *panel, 
 {
     size_t rows = (size_t)panel->na * panel->m, count = rows * n_columns;
     double *most = s->part, *scale = s->part + n_columns;
+    gather_stops(fl, panel, s);
     memcpy(s->added, s->forces, sizeof(double) * count);
     for (int turn = 0; turn < MOST_TURNS; turn++) {
         carry_columns(fl, tab, panel, n_columns, s->added, s);

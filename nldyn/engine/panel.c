@@ -108,8 +108,8 @@ static void fill_influences(const Flow *fl, const Gauss *tab, int kind, double h
         }
 }
 
-/* fill what a panel of length h needs to know of the linear part: there, to, rise, back, whole and
- * G */
+/* fill what a panel of length h needs to know of the linear part: there, home, to, rise, back,
+ * whole and G */
 static void panel_responses(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel,
                             Scratch *s)
 {
@@ -119,12 +119,12 @@ static void panel_responses(const Flow *fl, const Gauss *tab, int kind, double h
     panel->made_length = h;
     panel->inverted[0] = NAN;
     panel->weighed = false;
-    double *back = s->waves + 4 * m, *less = back + 4 * m;
+    double *less = s->waves + 4 * m;
     for (int i = 0; i < m; i++) s->times[i] = h * tab->chi[kind * m + i];
     for (int b = 0; b < fl->n; b++) {
-        double *there = panel->there + (size_t)4 * b * m;
-        fill_there_and_back(block_of(fl, b), s->times, m, there, back, less, s->waves);
-        fill_block_responses(fl, panel, b, there, back, less);
+        double *there = panel->there + (size_t)4 * b * m, *home = panel->home + (size_t)4 * b * m;
+        fill_there_and_back(block_of(fl, b), s->times, m, there, home, less, s->waves);
+        fill_block_responses(fl, panel, b, there, home, less);
         Square end = block_exponential(block_of(fl, b), h);
         ThereAndBack swing = there_and_back(block_of(fl, b), h);
         double whole[6] = {end.a, end.b, end.c, end.d, swing.less_a, swing.less_d};

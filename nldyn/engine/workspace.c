@@ -63,6 +63,7 @@ static void lay_out_panel(Block *block, const Flow *fl, int m, Panel *panel)
     panel->radial = numbers(block, nodes);
     panel->inverted = numbers(block, outputs);
     panel->there = numbers(block, 2 * size * m);
+    panel->home = numbers(block, 2 * size * m);
     panel->to = numbers(block, outputs * size);
     panel->back = numbers(block, nodes * size);
     panel->G = numbers(block, outputs * nodes);
@@ -82,7 +83,7 @@ static void lay_out_contacts(Block *block, const Flow *fl, const Gauss *tab, Scr
 {
     size_t m = tab->m, na = fl->n_stops, nodes = na * m, size = fl->size;
     s->times = numbers(block, m);
-    s->waves = numbers(block, 10 * m);
+    s->waves = numbers(block, 6 * m);
     s->product = numbers(block, m * m);
     s->free = numbers(block, 2 * nodes);
     s->new_slope = numbers(block, 4 * nodes);
@@ -117,7 +118,9 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     s->change = numbers(block, n_columns);
     if (na * m >= MANY) {
         s->added = numbers(block, na * m * n_columns);
-        s->part_many = numbers(block, (size_t)m * n_columns);
+        s->driven_many = numbers(block, (na > size ? na : size) * m * n_columns);
+        s->pushing = numbers(block, na * size);
+        s->showing = numbers(block, 2 * na * size);
         s->flown = numbers(block, size * m * n_columns);
     }
     s->stop_forces = numbers(block, na);

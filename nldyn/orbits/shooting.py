@@ -57,7 +57,7 @@ class ShootingProblem:
         """Forcing phases of the segment ends, shape (k + 1,)."""
         return self.start + np.linspace(0.0, 2.0 * np.pi * self.period, self.segments + 1)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of real coordinates of a state z."""
         return self.flow.system.state_size
