@@ -19,7 +19,8 @@ def with_places(page: str) -> tuple[str, dict[str, str]]:
 
     def marked(found: re.Match[str]) -> str:
         heading = re.findall(r"^#+ .*$", page[: found.start()], flags=re.MULTILINE)[-1]
-        table = name_of(heading).replace(" ", ".")
+        words = name_of(heading).replace('"', "").split()  # of several tables the last tells which
+        table = ".".join([*words[:1], *words[1:][-1:]])
 
         def row(key: re.Match[str]) -> str:
             name = f"{table}.{key[1]}".lstrip(".")

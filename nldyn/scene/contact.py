@@ -177,7 +177,8 @@ def told_of_areas(scene: Scene, reduced: cms.ReducedModel) -> list[str]:
         if not isinstance(table, MeshAreaTable) or found.places is None or found.weights is None:
             continue
         held = f" ({found.held} more are held by supports)" if found.held else ""
-        of = "" if table.points == "nodes" else f" that stand for {found.weights.sum():.4g} m or m²"
+        unit = {"area": "m²", "length": "m"}.get(found.measure or "")
+        of = f" that stand for {found.weights.sum():.4g} {unit}" if unit else ""
         text = f"contact area '{table.called}': {len(found.places)} points{of}{held}"
         for name, side in zip(_names(table), ("", " on the other side"), strict=True):
             if name in reduced.areas:

@@ -160,3 +160,10 @@ def test_a_convergence_study_refuses_to_refine_what_the_points_go_with(tmp_path)
         build_component(scene, refinement=2)
     with pytest.raises(SceneError, match="go with the mesh"):
         convergence_study_of(scene, meshes=[scene.mesh.file])
+
+
+def test_what_the_points_stand_for_is_told_with_its_unit(caplog):
+    """Beams of 0.3 m: a length."""
+    with caplog.at_level("INFO", logger="nldyn"):
+        build_reduced(load_scene(example("landing_strip.toml")))
+    assert "contact area 'support': 20 points that stand for 0.3 m;" in caplog.text

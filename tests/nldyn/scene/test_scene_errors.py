@@ -185,6 +185,17 @@ def test_what_is_given_twice_is_told_in_words_of_toml(tmp_path, text, fault):
             "stops[0].law must be 'hertz', 'linear' or 'rigid', not 'hertzian'",
         ),
         (
+            "stiffness = 5e9",
+            "law = 'lin'\nstiffness = 5e9\npulls = true",  # a key of one law
+            "stops[0].law must be 'hertz', 'linear' or 'rigid', not 'lin'",
+        ),
+        ('kind = "unbalance"', "", "excitation[0].kind is missing"),
+        (
+            "mass_times_radius = 4.92e-6",
+            "",
+            "excitation[0].mass_times_radius is missing: kind 'unbalance' needs it",
+        ),
+        (
             "[13.1, 125.1]",
             "{a = 1}",
             "modal.frequencies_hz must be a list in square brackets, not a table",
