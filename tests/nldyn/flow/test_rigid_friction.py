@@ -19,6 +19,7 @@ from nldyn import (
     continue_branch,
     impacts,
     load,
+    normal_form,
     save,
     simulate,
     solve_orbit,
@@ -399,3 +400,19 @@ def test_a_stiff_elastic_stop_with_friction_tends_to_the_rigid_one():
         soft = flown(block(1.0, 0.1).with_elements(stops=(stop,)), [0.0, 0.1, 2.0, 0.0], 0.25)[0]
         off.append(np.abs(soft - rigid).max())
     assert off[1] < 0.15 * off[0] < 1e-3  # as the duration of the contact, 1/√k
+
+
+def test_friction_counts_in_what_follows_a_grazing():
+    """The multiplier times the speed of a slight impact tends to what the normal form says."""
+    M, K = np.array([[1.0, 0.2], [0.2, 1.0]]), np.array([[2.0, -0.5], [-0.5, 1.0]])
+    system = System.from_matrices(
+        M, K, {"x": [1.0, 0.0], "y": [0.0, 1.0]}, damping=0.1 * K,
+        stops=[RigidStop("x", 0.7, 0.3, tangent="y", friction=0.6)],
+        excitation=[HarmonicForce("x", 0.7), HarmonicForce("y", 0.5)],
+    )  # fmt: skip
+    branch = continue_branch(solve_orbit(system, 0.2245), (0.224, 0.2252))
+    (touch,) = (point for point in branch.special_points if point.kind == "GR")
+    slight = [(o, hits.speed[0]) for o in branch.points if len(hits := impacts(o)) == 1]
+    growth = [abs(o.multipliers[0]) * speed for o, speed in slight if 1e-5 < speed < 2e-4]
+    assert growth
+    assert growth == pytest.approx(len(growth) * [normal_form(touch).coefficient.value], rel=0.03)
