@@ -102,8 +102,8 @@ static void gather_stops(const Flow *fl, const Panel *panel, Scratch *s)
             s->pushing[a * size + k] = -panel->made_length * push_of(fl, panel->active[a])[k];
 }
 
-/* move the pairs of coordinates in X (2n, m, n_columns), at each node by a matrix of its own; blocks
- * (n, 4, m) */
+/* move the pairs of coordinates in X (2n, m, n_columns), at each node by a matrix of its own, of
+ * blocks (n, 4, m) */
 static void move_nodes(const Flow *fl, const double *blocks, int m, int n_columns, double *X)
 {
     for (int b = 0; b < fl->n; b++, blocks += 4 * m) {
