@@ -250,6 +250,11 @@ def check_special(caller: str, special: object, kind: str = "", *, of_branch: bo
         raise SystemModelError(f"{caller} needs a special point, got {shown(special)}")
     if kind and found != kind:
         raise SystemModelError(f"{caller} needs a {kind} point, got {found}")
+    if orbit.self_excited:
+        raise SystemModelError(
+            f"{caller} knows special points of forced motions: the {found} at "
+            f"{orbit.frequency_hz:g} Hz is of self-excited ones, whose frequency is found"
+        )
     if of_branch and not is_of_branch(special):
         raise SystemModelError(
             f"{caller} needs a special point of a branch, which knows the branch's direction; "

@@ -30,6 +30,7 @@ BEHIND = (1e-4, 1e-3)  # distances from the corner at which an orbit behind it i
 FARTHEST = 10.0  # times these: how far Newton's method may lead
 MOST_SECANTS = 50
 MET = 1e-9  # slip beside the fastest one, at which it touches zero
+OF_PARAMETER = 10.0  # error of a parameter there over that, relative
 
 
 def sticking(orbit: Orbit) -> tuple[bool, ...]:
@@ -177,7 +178,7 @@ def at_rest_between(a: BranchNode, b: BranchNode) -> BranchNode | None:
 def corner_error(a: BranchNode, corner: BranchNode) -> float:
     """Error of a corner, or of the smallest limit cycle in place of a Hopf point."""
     if corner.corner != HOPF:
-        met = MET if corner.corner == GRAZING_SLIDING else 0.0
+        met = OF_PARAMETER * MET if corner.corner == GRAZING_SLIDING else 0.0
         return max(corner.orbit.error, met)
     place = corner.family.n_states
     squares = swing(a.orbit) ** 2, swing(corner.orbit) ** 2

@@ -443,6 +443,11 @@ def _charts(
         progress=(progress, Callable, None),
     )
     check_minimal(orbit)
+    if orbit.self_excited:
+        raise SystemModelError(
+            "curves in two parameters are those of forced motions: the frequency of this one is "
+            "found; follow it over one parameter by continue_branch"
+        )
     if len(parameters) != 2:
         raise SystemModelError(f"a curve of this kind needs two parameters, got {len(parameters)}")
     if len(ranges) != 2:

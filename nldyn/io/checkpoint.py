@@ -11,8 +11,15 @@ from nldyn.branches.branch import Branch
 from nldyn.branches.checkpoint import Tally
 from nldyn.curves.curves import Curve
 from nldyn.io.branches import load_bare_branches, load_exploration, save_branches, save_exploration
-from nldyn.io.curves import load_curves, save_curves
+from nldyn.io.curves import (
+    FORMAT,
+    is_self_excited,
+    load_curves,
+    save_curves,
+    save_self_excited,
+)
 from nldyn.io.flow import laws_of
+from nldyn.io.hdf5 import kind_of
 from nldyn.orbits.orbit import Orbit
 from nldyn.runtime.files import check_writable
 from nldyn.runtime.keeper import begun_before
@@ -69,11 +76,21 @@ class CheckpointFile:
         if not self.exists():
             return [], None
         laws = laws_of(system)
-        return begun_before(lambda path: load_bare_branches(path, laws), Path(self.path))
+
+        def read(path: Path) -> tuple[list[Branch], Tally | None]:
+            if kind_of(path)[0] != FORMAT:
+                return load_bare_branches(path, laws)
+            found = load_curves(path, laws=laws)
+            return [each for each in found if isinstance(each, Branch)], None
+
+        return begun_before(read, Path(self.path))
 
     def write_branches(self, branches: Sequence[Branch], tally: Tally | None = None) -> None:
         """Keep branches in place of what it holds."""
-        save_branches(self.path, branches, tally)
+        if any(map(is_self_excited, branches)):
+            save_self_excited(self.path, branches)
+        else:
+            save_branches(self.path, branches, tally)
 
     def read_exploration(self, system: System) -> Exploration:
         """The exploration of a system that it holds."""

@@ -21,6 +21,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, shown
 from nldyn.bifurcations.branch_crossing import distance
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
+from nldyn.branches.at_frequency import requested
 from nldyn.branches.branch import Branch
 from nldyn.branches.continuation import make_branch
 from nldyn.branches.endings import StopReason
@@ -39,6 +40,7 @@ from nldyn.orbits.conditions import (
     Held,
     Phase,
     Singular,
+    Turning,
 )
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem
@@ -49,6 +51,7 @@ from nldyn.system.parameters import Parameter
 FORMAT = "nldyn curves"
 FORMAT_VERSION = 3
 POINT_UNIT = f"{STATE_UNIT}; then the parameters' coordinates"
+SELF_EXCITED = "limit cycle"
 HELD = 1e-6  # how far the held quantity of a loaded curve may be off
 
 OwnMonitor = Callable[[Orbit], float]
@@ -77,6 +80,28 @@ def save_curves(path: str | Path, curves: Sequence[Curve]) -> None:
         groups = file.create_group("curves")
         for number, curve in enumerate(curves):
             _write_curve(groups.create_group(f"{number:04d}"), curve)
+
+
+def save_self_excited(path: str | Path, branches: Sequence[Branch]) -> None:
+    """Write branches of self-excited motions, whose frequency goes along, as curves.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    SystemModelError
+        If others are among them.
+    """
+    if not all(map(is_self_excited, branches)):
+        raise SystemModelError(
+            "branches of self-excited motions and of others are saved to files of their own"
+        )
+    save_curves(path, [Curve(SELF_EXCITED, branch) for branch in branches])
+
+
+def is_self_excited(branch: Branch) -> bool:
+    """Whether a branch is one of limit cycles, found with their frequency."""
+    return isinstance(branch.nodes[0].condition, Turning)
 
 
 def save_backbone(path: str | Path, found: Backbone) -> None:
@@ -127,11 +152,13 @@ def _write_curve(group: Any, curve: Curve) -> None:
     family = points[0].family
     for key, value in {
         "kind": curve.kind,
+        "name": curve.branch.name,
         "parameters": [chart.parameter.name for chart in family.charts],
         "observe": family.observe,
         "period": family.period,
         "segments": family.segments,
         "frequency_hz": family.frequency_hz,
+        "least": family.least,
         "stop_reasons": curve.stop_reasons,
         "notes": curve.notes,
         "marks": [mark.kind for mark in marks],
@@ -179,6 +206,7 @@ def _numbers_of(condition: Condition) -> dict[str, Any]:
         Grazing: ("stop", "is_maximum", "phase", "unit", "half", "every"),
         Held: ("target",),
         Phase: ("begin", "path"),
+        Turning: (),
     }[type(condition)]
     return {name: getattr(condition, name) for name in names}
 
@@ -197,10 +225,19 @@ def _read_curve(group: Group, laws: Laws, monitor: OwnMonitor | None) -> Curve |
         ),
         course=course,
     )
+    if is_self_excited(branch):
+        return _with_requested(replace(branch, name=group.text("name")))
     curve = Curve(kind, branch)
     if group.has_attribute("mode"):
         return Backbone(curve, group.whole("mode"))
     return _as_branch(curve) if nodes[0].condition is FREE else curve
+
+
+def _with_requested(branch: Branch) -> Branch:
+    """A branch with the orbits at the values that were asked for, found anew."""
+    if branch.course is None or not branch.course.at:
+        return branch
+    return replace(branch, requested=tuple(requested(branch.places, branch.course.at)[0]))
 
 
 def _read_points(
@@ -246,6 +283,8 @@ def _read_family(group: Group, laws: Laws) -> OrbitFamily:
     problem = ShootingProblem(flow, group.whole("period"), group.whole("segments"))
     held = group.number("frequency_hz")
     family = OrbitFamily(problem, group.text("observe"), held, tuple(charts))
+    if group.has_attribute("least"):  # not in files of earlier versions
+        family = replace(family, least=group.number("least"))
     if "unfolding" in group:
         family = family.unfolded(group.array("unfolding", family.n_states))
     if "origin" in group:
@@ -299,6 +338,8 @@ def _read_conditions(
     kind = group.text("kind")
     if kind == "Free":
         return [FREE] * count
+    if kind == "Turning":
+        return [Turning()] * count
     if kind == "Phase":
         size = family.problem.size
         return list(map(Phase, group.array("begin", count, size), group.array("path", count, size)))

@@ -19,7 +19,13 @@ from nldyn.io.branches import (
     save_diagram,
     save_exploration,
 )
-from nldyn.io.curves import load_curves, save_backbone, save_curves
+from nldyn.io.curves import (
+    is_self_excited,
+    load_curves,
+    save_backbone,
+    save_curves,
+    save_self_excited,
+)
 from nldyn.io.flow import Laws
 from nldyn.io.hdf5 import kind_of
 from nldyn.orbits.orbit import Orbit
@@ -64,11 +70,13 @@ def save(result: Result | Sequence[Branch] | Sequence[Curve], path: str | Path) 
     elif isinstance(result, Diagram):
         save_diagram(path, result)
     elif isinstance(result, Branch):
-        save_branches(path, [result])
+        save([result], path)
     elif isinstance(result, Backbone):
         save_backbone(path, result)
     elif isinstance(result, Curve):
         save_curves(path, [result])
+    elif _all(result, Branch) and any(map(is_self_excited, result)):  # type: ignore[arg-type]
+        save_self_excited(path, result)  # type: ignore[arg-type]
     elif _all(result, Branch):
         save_branches(path, result)  # type: ignore[arg-type]
     elif _all(result, Curve):

@@ -171,7 +171,9 @@ def _repeated(flow: FlowMap, state: Real, omega: float, observe: str) -> tuple[R
     away = np.linalg.norm(states[-2 : -2 - MOST_TURNS : -1] - states[-1], axis=1)
     if not away.min() <= COMES_BACK * size:
         raise ConvergenceError(
-            "the motion does not repeat itself: see classify_attractor what it does"
+            f"the motion does not repeat itself within {TRANSIENT} cycles of "
+            f"{omega / (2.0 * math.pi):g} Hz: it may come to rest slowly, or be chaotic; another "
+            "start may lead to a limit cycle"
         )
     back = int(np.flatnonzero(away <= max(NO_LONGER * away.min(), SAME * size))[0]) + 2
     period = float(inside[-1] - inside[-back]) / omega

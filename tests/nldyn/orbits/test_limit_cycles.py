@@ -14,8 +14,11 @@ from nldyn import (
     SystemModelError,
     continue_branch,
     limit_cycle,
+    load,
+    save,
     solve_orbit,
 )
+from nldyn.io import CheckpointFile
 from nldyn.system import CubicDamper, DryFriction, Friction
 
 AT_ONCE = 1e-12  # m/s, in which friction falls
@@ -194,3 +197,20 @@ def test_what_has_no_limit_cycle_is_told():
     forced = solve_orbit(driven, 0.1)
     assert not forced.self_excited
     assert forced.multiplier_along is None
+
+
+def test_a_branch_is_saved_goes_on_after_an_interruption_and_is_extended(tmp_path):
+    start = limit_cycle(on_belt(0.5, damping=0.04), [0.0, 0.5])  # as it sticks
+    whole = continue_branch(start, (0.45, 0.6), parameter="base_speed", at=[0.55], name="cycles")
+    save(whole, tmp_path / "whole.h5")
+    (back,) = load(tmp_path / "whole.h5")
+    assert back.name == "cycles"
+    assert back.values.tolist() == whole.values.tolist()
+    assert back.frequency_hz.tolist() == whole.frequency_hz.tolist()
+    assert [mark.kind for mark in back.special_points] == ["grazing-sliding"]
+    assert len(back.requested) == len(whole.requested) == 2
+    kept = CheckpointFile(tmp_path / "kept.h5")
+    short = continue_branch(start, (0.45, 0.54), parameter="base_speed", checkpoint=kept)
+    again = continue_branch(start, (0.45, 0.54), parameter="base_speed", checkpoint=kept)
+    assert again.values.tolist() == short.values.tolist()
+    assert continue_branch(short, (0.45, 0.56)).values.max() == pytest.approx(0.56)
