@@ -81,6 +81,15 @@ def test_a_spring_before_friction_may_change(tmp_path):
         followed_parameter(load_scene(path))
 
 
+def test_a_rigid_stop_has_friction_of_one_coefficient_without_a_spring(tmp_path):
+    plain = AT_STOP.replace("stop = 0", "stop = 1").replace("at_rest = 0.4\nfading_speed = 0.1", "")
+    stop = build_system(scene_with(tmp_path, plain)).stops[1]
+    assert stop.friction == Friction(0.3, base_speed=0.2)
+    assert (stop.impulsive, stop.tangent) == (True, "along")
+    with pytest.raises(SceneError, match="needs no tangential_stiffness: stop 1 is rigid"):
+        build_system(scene_with(tmp_path, plain + "tangential_stiffness = 7.0\n"))
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
