@@ -171,7 +171,7 @@ def plot_wear_around(orbit: Orbit, stop: int, ax: Axes | None = None) -> Axes:
     system = orbit.system
     check_whole("stop", stop, 0)
     ring = system.round_stops.get(stop)
-    if ring is None or not ring.friction:
+    if ring is None or ring.surface_speed is None:
         raise SystemModelError(f"stops[{stop}] is no round clearance with friction")
     count = INSTANTS * orbit.period
     phases = 2.0 * np.pi * orbit.period * np.arange(count) / count

@@ -467,13 +467,16 @@ class System:
 
     @cached_property
     def rubbing(self) -> tuple[Slider, ...]:
-        """All that friction acts on: the sliders, then what slides in round clearances."""
+        """All that friction may act on: the sliders, then what slides in round clearances.
+
+        Of these all whose speed of sliding is known, though their friction be zero.
+        """
         rings = [
             Slider(
                 stop.at, stop.against, Friction(stop.friction, base_speed=-stop.sliding_speed), i
             )
             for i, stop in self.round_stops.items()
-            if stop.friction
+            if stop.surface_speed is not None
         ]
         return (*self.sliders, *rings)
 

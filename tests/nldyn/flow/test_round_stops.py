@@ -29,6 +29,7 @@ from nldyn import (
     solve_orbit,
 )
 from nldyn.app.describe import describe_rest
+from nldyn.branches.tables import orbit_columns
 from nldyn.orbits.bordered import length_unit
 from nldyn.system import DryFriction
 from nldyn.system.chart import value_of, with_value
@@ -167,6 +168,17 @@ def test_work_rates_of_what_does_not_turn_are_those_of_an_independent_integratio
     assert end == pytest.approx(start, abs=1e-8 * np.abs(start).max())
     assert found.work_rate == pytest.approx(hz * work, rel=1e-8)
     assert found.loss == pytest.approx(0.2 * work, rel=1e-8)
+
+
+def test_a_table_goes_on_to_where_there_is_no_friction():
+    system, _ = elliptic()
+    to_none = Parameter("rubbing_friction", 0)
+    branch = continue_branch(solve_orbit(system, 9.0), (0.0, 0.2), parameter=to_none)
+    table = orbit_columns(branch.points)
+    order = np.argsort([node.value for node in branch.nodes])
+    lost = table["friction_loss_j"][order]
+    assert lost[0] == 0.0 and lost[-1] > 1e-4
+    assert branch.points[order[0]].friction[0].work_rate > 0.0
 
 
 def test_what_whirls_the_other_way_is_refused():
