@@ -91,7 +91,7 @@ def may_hide(z: BranchNode | None, a: BranchNode, b: BranchNode, c: BranchNode |
 
     That is where a multiplier moves far, or where a test or an extreme dips; the extremes of a body
     that comes to rest are too many to be told apart. States and Jacobians of segments are not
-    used: they jump where an impact passes a phase of shooting.
+    used: they jump where an impact passes a phase of shooting, and so does the tangent, LP.
     """
     before, after = a.orbit.multipliers, b.orbit.multipliers
     far = FAR if before.size > 2 else FAR_ALONE
@@ -102,9 +102,9 @@ def may_hide(z: BranchNode | None, a: BranchNode, b: BranchNode, c: BranchNode |
         if any(p is None for p in triple):
             continue
         places = hidden_dips(*(p for p in triple if p is not None))
-        if any(p.orbit.rests for p in triple if p is not None):
-            places = places[: len(tests(a))]
-        if any(low < where < high for where in places):
+        rests = any(p.orbit.rests for p in triple if p is not None)
+        last = len(tests(a)) if rests else None
+        if any(low < where < high for where in places[1:last]):  # the first is that of LP
             return True
     return False
 

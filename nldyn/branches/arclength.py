@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -39,12 +39,12 @@ from nldyn.branches.past_obstacles import (
     LONGER_CROSSINGS,
     NEAR_NODE,
     PAST_NODE,
+    SHARES,
     Advance,
     across_touch,
     clear_of_nodes,
     crossing_ahead,
     over_node,
-    past_impact_at_node,
 )
 from nldyn.branches.predictor import predicted
 from nldyn.branches.step_control import ContinuationOptions
@@ -242,19 +242,17 @@ class Stepper:
 
     def _shortened(self, behind: Real, here: BranchNode, step: float) -> Advance | None:
         """The longest step up to `step` that leads to a next point."""
-        free, jumps = here.condition is FREE, here.orbit.system.jumps
+        free = here.condition is FREE
         looked = bool(here.corner)
         nearest = SHORTEST_CROSSING if free else CORNER_STEP
         while step >= self.options.min_step:
             made = self._advance(behind, here, step, 0.0, looked)
-            if not free:
-                made = self._clear_of_nodes(made, here, step, looked)
-            elif made is None and step <= KINK:
-                made = self._across_touch(here, step)
-            elif made is None and jumps:
-                made = past_impact_at_node(
-                    here, (step,), min(FARTHEST_NODE, FASTEST * step), self.options.max_angle
-                )
+            if free and step <= KINK:
+                made = made or self._across_touch(here, step)
+            elif made is None or not (free or clear_of_nodes(made.there)):
+                steps = (step,) if free else [share * step for share in SHARES]
+                near = min(FARTHEST_NODE, FASTEST * step)
+                made = self._over_node(here, steps, near, looked) or made
             if made is None and step <= MEETING_STEP and self._met == 2.0 * step:
                 step, self._met = self._met, 0.0  # shorter, it ends too near to the flip
                 made = self._advance(behind, here, step, step)
@@ -275,8 +273,7 @@ class Stepper:
         """Next point from one beside which an impact, a crossing or a corner is in the way."""
         options = self.options
         if here.condition is FREE:
-            made = past_impact_at_node(here, PAST_NODE, NEAR_NODE, options.max_angle)
-            made = made or self._past_crossing(here)
+            made = self._over_node(here, PAST_NODE, NEAR_NODE) or self._past_crossing(here)
             return made and made._replace(step=made.there.arclength - here.arclength)
         if isinstance(here.condition, Turning):
             way = past_corner(here) if here.orbit.system.sliders else []
@@ -288,18 +285,16 @@ class Stepper:
         step = last.arclength - before.arclength
         return Advance(tuple(way), step, options.max_angle, options.max_miss)
 
-    def _clear_of_nodes(
-        self, made: Advance | None, here: BranchNode, step: float, looked: bool
+    def _over_node(
+        self, here: BranchNode, steps: Sequence[float], near: float, looked: bool = False
     ) -> Advance | None:
-        """A step along a curve, or one by states at other phases, if that ends too near to one."""
-        if made is not None and clear_of_nodes(made.there):
-            return made
+        """Next point by states at other phases, where an impact is as near to one of shooting."""
         none = np.empty((0, here.tangent.size))
 
         def straight_on(shot: BranchNode, length: float) -> Advance | None:
             return self._advance(none, shot, length, 0.0, looked)
 
-        return over_node(here, step, straight_on) or made
+        return over_node(here, steps, near, straight_on)
 
     def _advance(
         self,

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
-
-import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES
 from nldyn.bifurcations.branch_crossing import crossing_beside
-from nldyn.bifurcations.on_curve import FARTHEST_NODE, shot_from
+from nldyn.bifurcations.on_curve import shot_from
 from nldyn.bifurcations.point import BranchNode
-from nldyn.bifurcations.within_step import differs
+from nldyn.bifurcations.within_step import differs, may_hide
 from nldyn.branches.guards import (
-    FARTHEST_OFF,
     KINK,
-    grazing_between,
     is_shifted,
     loses_impact,
     mends_symmetry,
@@ -66,96 +61,53 @@ class Advance(NamedTuple):
         return self.way[-1]
 
 
-def past_impact_at_node(
-    here: BranchNode, steps: Sequence[float], near: float, max_angle: float
-) -> Advance | None:
-    """Next point where the phase of an impact with a rigid stop passes one of shooting, or None.
-
-    The state there jumps from that before the impact to that behind it, or back. So the step is
-    made with the states at other phases, the first of `steps` that leads on by no more than an
-    angle. The phase must be as near as told.
-    """
-    orbit, plain = here.orbit, here.family
-    before = impact_behind_node(orbit)
-    if abs(before) > near:
-        return None
-    family = plain.shot_from(start_far_from_impacts(orbit))
-    by_parameter = np.zeros(here.point.size)
-    by_parameter[-1] = math.copysign(1.0, here.tangent[-1])
-    try:
-        begin = family.unknowns(orbit)
-        first = correct(family, begin, FREE, np.abs(by_parameter))
-        if not first.converged:
-            return None
-        weights = family.metric(first.point)
-        direction = _unit(first.along, weights, by_parameter)
-        row = weights * direction
-        row /= np.linalg.norm(row)
-        for step in steps:
-            straight = first.point + step * direction
-            met = correct(family, straight, FREE, row)
-            off = metric_length(weights, met.point - straight)
-            if not met.converged or off > FARTHEST_OFF * max_angle * step:
-                continue
-            way = _unit(met.along, weights, weights * direction)
-            angle = math.acos(min(max(float(direction @ (weights * way)), -1.0), 1.0))
-            behind = impact_behind_node(met.orbit)
-            stays = (impacts_by_segment(met.orbit) == impacts_by_segment(orbit)).all()
-            if abs(behind) < AT_NODE or (stays and abs(before) > AT_NODE and before * behind > 0.0):
-                continue
-            by_parameter[-1] = math.copysign(1.0, way[-1])
-            guess = plain.unknowns(met.orbit)
-            guess[-1] = met.point[-1]
-            found = correct(
-                plain, guess, FREE, by_parameter, longest=NEAR_NODE, max_iterations=FROM_NEAR
-            )
-            if angle > max_angle or not found.converged:
-                continue
-            other = found.orbit
-            if loses_impact(other) or grazing_between(orbit, other):
-                continue
-            there = BranchNode.of(found, found.tangent(by_parameter), here.arclength + step)
-            if other.impacts == orbit.impacts and not differs(here, there):
-                return Advance((there,), step, angle, 0.0)
-    except FAILURES:
-        pass
-    return None
-
-
-def _unit(vector: Real, weights: Real, towards: Real) -> Real:
-    """A vector made as long as 1 in a metric, on the side of a row."""
-    length = metric_length(weights, vector)
-    return np.asarray(vector / (length if float(towards @ vector) >= 0.0 else -length))
-
-
 def over_node(
-    here: BranchNode, step: float, straight_on: Callable[[BranchNode, float], Advance | None]
+    here: BranchNode,
+    steps: Sequence[float],
+    near: float,
+    straight_on: Callable[[BranchNode, float], Advance | None],
 ) -> Advance | None:
-    """Next point of a curve where the phase of an impact passes one of shooting.
+    """Next point where the phase of an impact passes one of shooting, or None.
 
-    Differences of a condition must not reach across it. So the walk is made with the states at
-    other phases, and steps like `step` up to a point clear of that phase.
+    The state there jumps from that before the impact to that behind it, or back, and differences
+    of a condition must not reach across it. So the walk is made with the states at other phases:
+    the first of `steps` that leads past it, or along a curve some of them, up to a point clear of
+    it. The impact must be as near to that phase as told.
     """
-    if nodes_to_impacts(here.orbit) >= min(FARTHEST_NODE, FASTEST * step):
+    if nodes_to_impacts(here.orbit) > near:
         return None
+    free = here.condition is FREE
     try:
         shot = shot_from(here, start_far_from_impacts(here.orbit))
-        for _ in range(MOST_OVER_NODE):
+        for _ in range(1 if free else MOST_OVER_NODE):
             first = None
-            for share in SHARES:
-                beyond = straight_on(shot, share * step)
+            for step in steps:
+                beyond = straight_on(shot, step)
                 if beyond is None:
                     continue
                 first = first or beyond.there
                 there = shot_from(beyond.there, 0.0)
-                if clear_of_nodes(there):
-                    return beyond._replace(way=(there,), step=step)
+                if is_past_node(here, there) if free else clear_of_nodes(there):
+                    return beyond._replace(way=(there,), step=steps[0])
             if first is None:
                 break
             shot = first
     except FAILURES:
         pass
     return None
+
+
+def is_past_node(here: BranchNode, there: BranchNode) -> bool:
+    """Whether an impact at a phase of shooting has passed it, and nothing else happens between.
+
+    What may hide between two points is not looked for across such a phase.
+    """
+    before, behind = impact_behind_node(here.orbit), impact_behind_node(there.orbit)
+    stays = (impacts_by_segment(there.orbit) == impacts_by_segment(here.orbit)).all()
+    if abs(behind) < AT_NODE or (stays and abs(before) > AT_NODE and before * behind > 0.0):
+        return False
+    hides = differs(here, there) or may_hide(None, here, there, None)
+    return not (hides or loses_impact(there.orbit))
 
 
 def clear_of_nodes(node: BranchNode) -> bool:
