@@ -22,10 +22,7 @@ from nldyn.bifurcations.chord import CROSSING_ERROR
 from nldyn.bifurcations.events import Events, check_values, checked_events
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.at_frequency import check_requested, requested
-from nldyn.branches.branch import (
-    Branch,
-    Course,
-)
+from nldyn.branches.branch import Branch, Course
 from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_at
 from nldyn.branches.conditioned import of_self_excited, start_on
 from nldyn.branches.endings import Ending, StopReason, StopReasons
@@ -142,38 +139,42 @@ def continue_branch(
     >>> weaker.values[[0, -1]].tolist()
     [0.01, 0.02]
     """
-    if isinstance(start, Branch):
-        return extended(start, limits, options, at, progress, checkpoint, parameter, events)
-    if limits is None:
-        raise SystemModelError("continue_branch: an orbit needs limits, the range of its parameter")
     check_types(
-        start=(start, Orbit),
+        start=(start, Orbit, Branch),
         name=(name, str),
         options=(options, ContinuationOptions, None),
         progress=(progress, Callable, None),
         open_ends=(open_ends, Sequence),
     )
-    check_minimal(start)
-    family = family_over(start, limits, parameter)
-    chart = family.charts[0]
-    course = Course(
-        (chart.low, chart.high),
-        options or ContinuationOptions(),
-        alike(family, [numbers("open_ends", end) for end in open_ends]),
-        check_requested(() if at is None else at, chart),
-        events=checked_events(() if events is None else events),
-        further=tuple((other.low, other.high) for other in family.charts[1:]),
-    )
-    check_values(course.events, start)
-    if start.self_excited:
-        first = start_on(family, start, Turning())
+    known = None
+    if isinstance(start, Branch):
+        known, before = over_range(start, limits, parameter)
+        first = known.nodes[before.start]
     else:
-        first = start_point(family.place(start), 1.0)
-    with checkpoint_at(checkpoint, start.system) as kept:
-        known = kept.branch_from(first, course)
-        if known is not None:
-            return extended(known, at=at, progress=progress, checkpoint=kept, events=events)
-        return complete(name, None, None, first, course, progress, kept)
+        if limits is None:
+            raise SystemModelError(
+                "continue_branch: an orbit needs limits, the range of its parameter"
+            )
+        check_minimal(start)
+        family = family_over(start, limits, parameter)
+        avoided = alike(family, [numbers("open_ends", end) for end in open_ends])
+        further = tuple((other.low, other.high) for other in family.charts[1:])
+        before = Course(limits, ContinuationOptions(), avoided, further=further)
+        if start.self_excited:
+            first = start_on(family, start, Turning())
+        else:
+            first = start_point(family.place(start), 1.0)
+    chart = first.family.charts[0]
+    course = replace(
+        before,
+        limits=(chart.low, chart.high),
+        options=options or before.options,
+        at=check_requested(before.at if at is None else at, chart),
+        events=before.events if events is None else checked_events(events),
+    )
+    check_values(course.events, first.orbit)
+    with checkpoint_at(checkpoint, first.family.system) as kept:
+        return going_on(name, known, first, course, progress, kept)
 
 
 def family_over(
@@ -207,17 +208,54 @@ def family_over(
     return of_self_excited(orbit, chart)
 
 
-def extended(
-    branch: Branch,
-    limits: tuple[float, float] | None = None,
-    options: ContinuationOptions | None = None,
-    at: Sequence[float] | None = None,
-    progress: Callable[[float], None] | None = None,
-    checkpoint: BranchFile | Checkpoint | None = None,
-    parameter: str | Parameter | None = None,
-    events: Events | None = None,
+def going_on(
+    name: str,
+    branch: Branch | None,
+    start: BranchNode,
+    course: Course,
+    progress: Progress | None,
+    checkpoint: Checkpoint,
+    ahead: Ahead | None = None,
 ) -> Branch:
-    """Finish or extend a branch; see `continue_branch`."""
+    """A branch or curve from a start, from what is known of it, here or by a checkpoint.
+
+    Parameters
+    ----------
+    name : str
+        Name of one that is new.
+    branch : Branch, optional
+        One to finish, or to follow through wider ranges on the scale that it has.
+    start, course, progress, checkpoint, ahead
+        As for `complete`.
+    """
+    before = branch and branch.course
+    kept = checkpoint.branch_from(start, course, *([before] if before else []))
+    if kept is not None and kept.course is not None and kept.course.ranges == course.ranges:
+        branch = kept  # this very one was begun before
+    if branch is None:
+        return complete(name, None, None, start, course, progress, checkpoint, ahead)
+    forward, backward = split(branch)
+    start = forward.nodes[0]
+    return complete(branch.name, forward, backward, start, course, progress, checkpoint, ahead)
+
+
+def finished(branch: Branch, progress: Progress | None, checkpoint: Checkpoint) -> Branch:
+    """A branch followed to the ends of its course."""
+    course = branch.course
+    assert course is not None
+    return going_on("", branch, branch.nodes[course.start], course, progress, checkpoint)
+
+
+def over_range(
+    branch: Branch, limits: tuple[float, float] | None, parameter: str | Parameter | None
+) -> tuple[Branch, Course]:
+    """A branch with a range that contains the one of before, and its course.
+
+    Raises
+    ------
+    SystemModelError
+        If the range does not contain that, the branch has another parameter or no course.
+    """
     course = branch.course
     if course is None:
         raise SystemModelError(
@@ -228,51 +266,15 @@ def extended(
             f"branch '{branch.name}' was followed in {branch.parameter.name}: begin at one of its "
             "orbits to follow another parameter"
         )
-    chart = _chart_beyond(branch, course.limits if limits is None else limits)
-    new = replace(
-        course,
-        limits=(chart.low, chart.high),
-        options=options or course.options,
-        at=check_requested(course.at if at is None else at, chart),
-        events=course.events if events is None else checked_events(events),
-    )
-    check_values(new.events, branch.points[0])
-    family = branch.nodes[0].family
-    with checkpoint_at(checkpoint, family.system) as kept:
-        return going_on(branch, (chart, *family.charts[1:]), new, progress, kept)
-
-
-def going_on(
-    branch: Branch,
-    charts: tuple[Chart, ...],
-    new: Course,
-    progress: Progress | None,
-    checkpoint: Checkpoint,
-) -> Branch:
-    """A branch or curve finished, or followed through wider ranges on the scale that it has."""
-    course = branch.course
-    assert course is not None
-    branch = on_charts(branch, charts)
-    known = checkpoint.branch_from(branch.nodes[course.start], new, course)
-    if known is not None and known.course is not None and known.course.ranges == new.ranges:
-        branch, course = known, known.course  # this very extension was begun before
-    forward, backward = split(branch, course)
-    start = branch.nodes[course.start]
-    return complete(branch.name, forward, backward, start, new, progress, checkpoint)
-
-
-def _chart_beyond(branch: Branch, limits: tuple[float, float]) -> Chart:
-    """The chart of a branch over a range that contains the one of before."""
-    chart = branch.nodes[0].family.charts[0]
-    assert branch.course is not None
-    low, high = branch.course.limits
-    wider = chart.over(limits)
+    chart, *others = branch.nodes[0].family.charts
+    low, high = course.limits
+    wider = chart.over(course.limits if limits is None else limits)
     if not wider.low <= low < high <= wider.high:
         raise SystemModelError(
             f"{chart.range_name} = ({wider.low:g}, {wider.high:g}) must contain the range of the "
             f"branch, ({low:g}, {high:g})"
         )
-    return wider
+    return on_charts(branch, (wider, *others)), course
 
 
 def on_charts(branch: Branch, charts: tuple[Chart, ...]) -> Branch:
@@ -337,9 +339,7 @@ def complete(
             waiting = partial(progress, here) if progress else None
             return ahead.value(key, walked_leg, first, course, meanwhile=waiting)
         ahead.forget(key)
-        leg = leg or Leg([first], [], [], Ending.NOT_FINISHED.told(), None)
-        trail = LegBuilder.going_on(leg, course.limits, course.options, course.open_ends)
-
+        trail = LegBuilder.going_on(leg or Leg.of(first), course)
         checkpoint.work = lambda: whole(trail.so_far())
         return trail.follow(progress, kept)
 
@@ -347,15 +347,16 @@ def complete(
         checkpoint.offer()
         ahead.look()
 
+    back = start.reversed()
     if forward is None:
-        offer_leg(ahead, start.reversed(), course, first=True)
+        offer_leg(ahead, back, course, first=True)
     forward = walked(forward, start, lambda leg: join(name, leg, backward, course) if leg else None)
     if forward.reason.closes:
-        ahead.forget(leg_key(start.reversed(), course))
+        ahead.forget(leg_key(back, course))
         backward = None
     else:
         done = forward
-        backward = walked(backward, start.reversed(), lambda leg: join(name, done, leg, course))
+        backward = walked(backward, back, lambda leg: join(name, done, leg, course))
     branch = join(name, forward, backward, course)
     points, lost = requested(branch.places, course.at)
     lost = [note for note in lost if note not in branch.notes]
@@ -370,9 +371,7 @@ def walked_leg(
     flow: FlowMap, first: BranchNode, course: Course, look: Callable[[], None] | None = None
 ) -> Leg:
     """The leg of a branch from a point on, whole; ``look`` is called on the way."""
-    leg = Leg([first], [], [], Ending.NOT_FINISHED.told(), None)
-    trail = LegBuilder.going_on(leg, course.limits, course.options, course.open_ends)
-    return trail.follow(keep=look)
+    return LegBuilder.going_on(Leg.of(first), course).follow(keep=look)
 
 
 def leg_key(first: BranchNode, course: Course) -> Hashable:
@@ -558,9 +557,10 @@ def _without_first(leg: Leg) -> Leg:
     return replace(leg, special_points=leg.special_points[1:], end=end)
 
 
-def split(branch: Branch, course: Course) -> tuple[Leg, Leg | None]:
+def split(branch: Branch) -> tuple[Leg, Leg | None]:
     """The legs of which a branch was joined: forward and, if it was begun, backward."""
-    nodes, notes = branch.nodes, branch.notes
+    nodes, notes, course = branch.nodes, branch.notes, branch.course
+    assert course is not None
     special = branch.bifurcations
     start, specials, lines = course.start, course.special_points_before, course.notes_before
     first, last = branch.stop_reasons

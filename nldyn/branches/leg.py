@@ -25,7 +25,7 @@ from nldyn.bifurcations.point import BranchNode, SpecialPoint, place_of
 from nldyn.bifurcations.touching import grazes_exactly, rigid_grazing, rigid_touches
 from nldyn.bifurcations.within_step import insert_dip, special_points_between
 from nldyn.branches.arclength import Stepper, StepperState
-from nldyn.branches.branch import WalkEnd
+from nldyn.branches.branch import Course, WalkEnd
 from nldyn.branches.endings import Ending, StopReason
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.bordered import FREE, Solved, length_unit
@@ -69,6 +69,11 @@ class Leg:
     reason: StopReason
     end: WalkEnd | None
 
+    @classmethod
+    def of(cls, first: BranchNode) -> Leg:
+        """One that is to begin at a point."""
+        return cls([first], [], [], Ending.NOT_FINISHED.told(), None)
+
 
 @dataclass
 class LegBuilder:
@@ -97,15 +102,9 @@ class LegBuilder:
         self._mark = self._here() if self.nodes else None
 
     @classmethod
-    def going_on(
-        cls,
-        leg: Leg,
-        limits: tuple[float, float],
-        options: ContinuationOptions,
-        open_ends: Real,
-    ) -> LegBuilder:
-        """The same walk with another end of its range or other options."""
-        walk = Stepper(leg.nodes[0], limits, options, open_ends)
+    def going_on(cls, leg: Leg, course: Course) -> LegBuilder:
+        """The same walk with the end of the range and the options of a course."""
+        walk = Stepper(leg.nodes[0], course.limits, course.options, course.open_ends)
         end = leg.end
         if end is None:
             return cls(walk)

@@ -292,7 +292,7 @@ def _course(family: OrbitFamily, max_points: int) -> Course:
 
 def _followed(leg: Leg, course: Course, mode: int, high: float, begins: StopReason) -> Backbone:
     """A backbone followed on up to an amplitude from rest."""
-    trail = LegBuilder.going_on(leg, course.limits, course.options, course.open_ends)
+    trail = LegBuilder.going_on(leg, course)
     walk, nodes = trail.walk, list(trail.nodes)
     stride, kept = walk.stride, len(nodes) - 1
     rest_m = _rest_m(leg.nodes[0].family.system, leg.nodes[0].orbit.observe)

@@ -29,7 +29,7 @@ from nldyn.branches.arclength import Stepper
 from nldyn.branches.branch import Branch, Course
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.conditioned import start_on
-from nldyn.branches.continuation import alike, complete, going_on, start_point
+from nldyn.branches.continuation import alike, going_on, on_charts, start_point
 from nldyn.branches.endings import Ending, StopReasons, has_ending
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.branches.tables import orbit_columns
@@ -205,13 +205,18 @@ class Curve:
             chart.check_start(float(column.max()))
         pairs = zip(self.points[0].family.charts, wider, strict=True)
         charts = tuple(old.over(_range(new)) for old, new in pairs)
-        whole = _begun(self.branch)
+        whole = on_charts(_begun(self.branch), charts)
         assert whole.course is not None
-        options = options or whole.course.options
         first, *others = map(_range, charts)
-        course = replace(whole.course, limits=first, further=tuple(others), options=options)
-        with _kept(self.kind, self.points[0], checkpoint) as kept:
-            return Curve(self.kind, going_on(whole, charts, course, progress, kept))
+        course = replace(
+            whole.course,
+            limits=first,
+            further=tuple(others),
+            options=options or whole.course.options,
+        )
+        start = whole.nodes[course.start]
+        with _kept(self.kind, start, checkpoint) as kept:
+            return Curve(self.kind, going_on("", whole, start, course, progress, kept))
 
     def at(self, parameter: str | Parameter, value: float) -> list[Orbit]:
         """All orbits of the curve at which a parameter has a value, corrected there, each once.
@@ -469,13 +474,9 @@ def _curve(
     checkpoint: CurveFile | None,
 ) -> Curve:
     """Walk both ways from the start and mark what is met, or go on with what a file holds."""
-    charts = start.family.charts
     course = _course(start.family, options)
     with _kept(kind, start, checkpoint) as kept:
-        known = kept.branch_from(start, course)
-        if known is not None:
-            return Curve(kind, going_on(known, charts, course, progress, kept))
-        return Curve(kind, complete("", None, None, start, course, progress, kept))
+        return Curve(kind, going_on("", None, start, course, progress, kept))
 
 
 def _course(family: OrbitFamily, options: ContinuationOptions | None = None) -> Course:

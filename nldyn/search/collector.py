@@ -18,8 +18,7 @@ from nldyn.branches.branch import Branch, Course
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.continuation import (
     broken_off,
-    complete,
-    extended,
+    going_on,
     leg_key,
     offer_branch,
     open_ends,
@@ -313,12 +312,7 @@ class Collector:
         group = "period", start.orbit.period
         progress(start.value)
         ahead.take(group, leg_key(start, course))
-        branch = self.checkpoint.branch_from(start, course)
-        if branch is not None:
-            branch = extended(branch, progress=progress, checkpoint=self.checkpoint)
-        else:
-            branch = complete("", None, None, start, course, progress, self.checkpoint, ahead)
-        self.take_in(branch)
+        self.take_in(going_on("", None, start, course, progress, self.checkpoint, ahead))
         ahead.release(group)
         ahead.drop(self._is_of_last)
 

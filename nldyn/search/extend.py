@@ -14,7 +14,7 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, check_whole, shown
 from nldyn.branches.branch import Branch, check_branches
 from nldyn.branches.checkpoint import BranchFile, Tally, checkpoint_of_several
-from nldyn.branches.continuation import extended
+from nldyn.branches.continuation import finished
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.axis import Axis, Section
 from nldyn.orbits.orbit import Orbit
@@ -337,7 +337,7 @@ def _take_kept(box: Collector, max_period: int) -> None:
     count = len(box.branches)
     for branch in box.checkpoint.new_branches(lambda branch: box.known(middle_orbit(branch))):
         progress = partial(box.tell, f"1/{branch.period}")
-        box.take_in(extended(branch, progress=progress, checkpoint=box.checkpoint))
+        box.take_in(finished(branch, progress, box.checkpoint))
     box.follow_up(count, max_period, max_period, None)
 
 
