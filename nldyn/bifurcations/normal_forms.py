@@ -6,7 +6,7 @@ Nothing here is computed by a continuation: the coefficients cost a few dozen fl
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -215,22 +215,40 @@ def displacement_along(place: Place, q: Real) -> float:
 
 def _flip(special: SpecialPoint, loop: Loop) -> NormalForm:
     form, _ = flip(loop)
-    shift = doubled_parameter(form)
-    hz, sign, side = _hz(special), form.nonlinear.sign, shift.sign
-    title = f"Flip at {hz}"
-    if not (sign and side):
-        sentence = f"{title}: super- or subcritical cannot be told, {LOST}."
-        return NormalForm("flip", sentence, form.nonlinear, shift)
+    duration = f"{2e3 * special.orbit.duration:.4g} ms"
+    return _by_sign(
+        special, f"Flip at {_hz(special)}", "flip", form.nonlinear, doubled_parameter(form), 1,
+        lambda stable: f"{_a(stable)} orbit of twice the period ({duration}) exists",
+    )  # fmt: skip
+
+
+def _by_sign(
+    special: SpecialPoint,
+    title: str,
+    name: str,
+    coefficient: Estimate,
+    shift: Estimate,
+    sense: int,
+    born: Callable[[bool], str],
+    tail: str = "",
+) -> NormalForm:
+    """Super- or subcritical, by the sign of a coefficient, of which `sense` is supercritical.
+
+    What is born is stable if it is and no other multiplier lies outside the unit circle.
+    """
+    hz, supercritical = _hz(special), coefficient.sign == sense
+    if not (coefficient.sign and shift.sign):
+        sentence = f"{title}: super- or subcritical cannot be told, {LOST}{tail}."
+        return NormalForm(name, sentence, coefficient, shift)
     others = others_outside(special)
-    stable = sign > 0 and not others
-    word = "supercritical" if sign > 0 else "subcritical"
-    orbit = f"{'a stable' if stable else 'an unstable'} orbit of twice the period"
-    why = f" ({_other_multipliers(others)})" if sign > 0 and others else ""
-    sentence = (
-        f"{title}, {word}: {orbit} ({2e3 * special.orbit.duration:.4g} ms) exists "
-        f"{SIDES[side]} {hz}{why}."
-    )
-    return NormalForm(f"{word} flip", sentence, form.nonlinear, shift, side, stable)
+    stable, word = supercritical and not others, "supercritical" if supercritical else "subcritical"
+    why = f" ({_other_multipliers(others)})" if supercritical and others else ""
+    sentence = f"{title}, {word}: {born(stable)} {SIDES[shift.sign]} {hz}{why}{tail}."
+    return NormalForm(f"{word} {name}", sentence, coefficient, shift, shift.sign, stable)
+
+
+def _a(stable: bool) -> str:
+    return "a stable" if stable else "an unstable"
 
 
 # --- tori ----------------------------------------------------------------------------------------
@@ -238,24 +256,12 @@ def _flip(special: SpecialPoint, loop: Loop) -> NormalForm:
 
 def _torus(special: SpecialPoint, loop: Loop) -> NormalForm:
     mu = critical_pair(special.orbit.multipliers)
-    form = torus(loop, mu)
-    shift = form.parameter
-    hz, sign, side = _hz(special), form.nonlinear.sign, shift.sign
-    turn = resonance(mu)
-    if not (sign and side):
-        sentence = (
-            f"Neimark-Sacker point at {hz}: super- or subcritical cannot be told, {LOST}; {turn}."
-        )
-        return NormalForm("torus", sentence, form.nonlinear, shift)
-    others = others_outside(special)
-    stable = sign < 0 and not others
-    word = "supercritical" if sign < 0 else "subcritical"
-    why = f" ({_other_multipliers(others)})" if sign < 0 and others else ""
-    sentence = (
-        f"Neimark-Sacker point at {hz}, {word}: {'a stable' if stable else 'an unstable'} torus "
-        f"(a motion of two frequencies) exists {SIDES[side]} {hz}{why}; {turn}."
-    )
-    return NormalForm(f"{word} torus", sentence, form.nonlinear, shift, side, stable)
+    form, title = torus(loop, mu), f"Neimark-Sacker point at {_hz(special)}"
+    return _by_sign(
+        special, title, "torus", form.nonlinear, form.parameter, -1,
+        lambda stable: f"{_a(stable)} torus (a motion of two frequencies) exists",
+        f"; {resonance(mu)}",
+    )  # fmt: skip
 
 
 def critical_pair(multipliers: Complex) -> complex:
@@ -307,25 +313,15 @@ def _shorter_period_met(special: SpecialPoint, shorter: int) -> NormalForm:
 
 def _pitchfork(special: SpecialPoint, found: Crossing) -> NormalForm:
     form: Coefficients = found.pitchfork
-    shift = form.parameter
-    hz, sign, side = _hz(special), form.nonlinear.sign, shift.sign
     symmetric = _breaks_mirror(special.orbit, found.q)
-    title = f"Branch point at {hz}, pitchfork"
+    title = f"Branch point at {_hz(special)}, pitchfork"
     if symmetric:
         title += " (the symmetry x(t + T/2) = -x(t) breaks)"
-    if not (sign and side):
-        sentence = f"{title}: super- or subcritical cannot be told, {LOST}."
-        return NormalForm("pitchfork", sentence, form.nonlinear, shift)
-    others = others_outside(special)
-    stable = sign < 0 and not others
-    word = "supercritical" if sign < 0 else "subcritical"
     pair = "mirror images of each other" if symmetric else "one on either side of the old one"
-    why = f"; {_other_multipliers(others)}" if sign < 0 and others else ""
-    sentence = (
-        f"{title}, {word}: two {'stable' if stable else 'unstable'} orbits, {pair}, exist "
-        f"{SIDES[side]} {hz}{why}."
-    )
-    return NormalForm(f"{word} pitchfork", sentence, form.nonlinear, shift, side, stable)
+    return _by_sign(
+        special, title, "pitchfork", form.nonlinear, form.parameter, -1,
+        lambda stable: f"two {'stable' if stable else 'unstable'} orbits, {pair}, exist",
+    )  # fmt: skip
 
 
 def _transcritical(special: SpecialPoint, found: Crossing) -> NormalForm:

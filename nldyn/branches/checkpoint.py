@@ -14,7 +14,7 @@ from nldyn.branches.branch import Branch, Course
 from nldyn.flow.flow_map import FlowMap, same_flow
 from nldyn.orbits.axis import Axis
 from nldyn.orbits.bordered import Place
-from nldyn.runtime.keeper import Keeper
+from nldyn.runtime.keeper import Keeper, KeptFile
 from nldyn.system.system import System
 
 
@@ -47,18 +47,11 @@ class Tally:
     met: frozenset[int] = frozenset()
 
 
-class BranchFile(Protocol):
+class BranchFile(KeptFile, Protocol):
     """A file of branches; `nldyn.io.CheckpointFile` is one.
 
     For developers: whatever else keeps branches has these methods.
     """
-
-    @property
-    def name(self) -> str:
-        """How messages call it."""
-
-    def check_writable(self) -> None:
-        """Raise an `OutputError` if it cannot be written."""
 
     def read_branches(self, system: System) -> tuple[list[Branch], Tally | None]:
         """The branches of a system that it holds, and how far a search has come; none if new."""

@@ -36,6 +36,7 @@ from nldyn.branches.tables import orbit_columns
 from nldyn.orbits.bordered import Condition, OrbitFamily
 from nldyn.orbits.conditions import Held, Monitor, defined_by
 from nldyn.orbits.orbit import Orbit, check_minimal, same_orbit
+from nldyn.runtime.keeper import KeptFile
 from nldyn.runtime.progress import of_place, shows_progress
 from nldyn.system.chart import Chart, checked_parameter, parameter_name, value_of
 from nldyn.system.parameters import Parameter
@@ -46,18 +47,8 @@ CLOSE = 1e-3  # how far the defining condition of a start may be off
 SAME_VALUE = 1e-8  # relative difference of parameters of one place
 
 
-class CurveFile(Protocol):
+class CurveFile(KeptFile, Protocol):
     """A file that keeps a curve; `nldyn.io.CheckpointFile` is one."""
-
-    @property
-    def name(self) -> str:
-        """How messages call it."""
-
-    def exists(self) -> bool:
-        """Whether an earlier run has written it."""
-
-    def check_writable(self) -> None:
-        """Raise an `OutputError` if it cannot be written."""
 
     def remove(self) -> None:
         """Delete it, if it is there."""

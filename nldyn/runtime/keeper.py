@@ -11,7 +11,7 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Generic, Self, TypeVar
+from typing import Generic, Protocol, Self, TypeVar
 
 from nldyn.base.errors import KeptWorkError, SystemModelError
 from nldyn.runtime.result_directory import OutputError
@@ -20,6 +20,20 @@ Kept = TypeVar("Kept")
 Item = TypeVar("Item")
 PAUSE = 5.0  # s, at least, between two writings
 SHARE = 20.0  # times as long as it took to write
+
+
+class KeptFile(Protocol):
+    """A file that keeps unfinished work."""
+
+    @property
+    def name(self) -> str:
+        """How messages call it."""
+
+    def exists(self) -> bool:
+        """Whether an earlier run has written it."""
+
+    def check_writable(self) -> None:
+        """Raise an `OutputError` if it cannot be written."""
 
 
 class Keeper(Generic[Item]):

@@ -54,11 +54,14 @@ class Collector:
     flip_ends: list[Orbit] = field(default_factory=list)
     crossings: list[SpecialPoint] = field(default_factory=list)
     done: float = 0.0  # share of the whole computation
-    ahead: Ahead | None = None
+    ahead: Ahead = field(init=False)
     outlook: Outlook = field(default_factory=Outlook)
     starts: dict[int, tuple[SpecialPoint, BranchNode | LocateError]] = field(
         default_factory=dict
     )  # of the branches born at flips, by the flips' ids
+
+    def __post_init__(self) -> None:
+        self.ahead = Ahead(self.flow)
 
     def at(self, value: float) -> Section:
         """The motions at a value of the parameter."""
@@ -73,8 +76,7 @@ class Collector:
         if self.axis.parameter.name != FREQUENCY:
             what, value = f"{what} at {self.axis.told(value)}", 0.0
         self.progress(what, value, self.done)
-        if self.ahead is not None:
-            self.ahead.look()
+        self.ahead.look()
 
     def reach(self, part: str, count: int) -> None:
         """Count what is done of a part of the `outlook`."""
@@ -157,7 +159,7 @@ class Collector:
 
     def offer_orbits(self, orbits: Iterable[Orbit]) -> None:
         """Let branches be followed ahead, of each period one at a time: most will be the same."""
-        if self.ahead is None or self.ahead.executor is None:
+        if self.ahead.executor is None:
             return
         for orbit in orbits:
             try:
@@ -173,7 +175,7 @@ class Collector:
 
         A branch mostly leads from one flip to the next; so only every other one is tried.
         """
-        if self.ahead is None or self.ahead.executor is None:
+        if self.ahead.executor is None:
             return
         flips = [special for special in branch.special_points if special.kind == "PD"]
         for special in flips[::2]:
@@ -308,13 +310,12 @@ class Collector:
             return
         progress = partial(self.tell, f"1/{start.orbit.period}")
         course = self._course(start, options)
-        ahead = self.ahead or Ahead(self.flow)
         group = "period", start.orbit.period
         progress(start.value)
-        ahead.take(group, leg_key(start, course))
-        self.take_in(going_on("", None, start, course, progress, self.checkpoint, ahead))
-        ahead.release(group)
-        ahead.drop(self._is_of_last)
+        self.ahead.take(group, leg_key(start, course))
+        self.take_in(going_on("", None, start, course, progress, self.checkpoint, self.ahead))
+        self.ahead.release(group)
+        self.ahead.drop(self._is_of_last)
 
     def _is_of_last(self, task: Task) -> bool:
         """Whether the leg of a task is one of the branch that was found last."""

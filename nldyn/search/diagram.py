@@ -38,7 +38,7 @@ from nldyn.orbits.starts import (
     reach,
     simulate_strobe,
 )
-from nldyn.runtime.prefetch import Ahead, computing_ahead
+from nldyn.runtime.prefetch import computing_ahead
 from nldyn.runtime.progress import Progress, shows_progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.collector import Collector, counted
@@ -451,8 +451,6 @@ def _searched(
     part: str,
 ) -> list[Found]:
     """What simulations at some values come near, on all processes."""
-    ahead = box.ahead or Ahead(box.flow)
-
     counts = Counter({period: int(box.outlook.reached[f"1/{period}"]) for period in periods})
 
     def told(done: int, found: Found) -> None:
@@ -470,7 +468,7 @@ def _searched(
         box.tell(part, values[0])
     arguments = [(box.axis, value, tuple(periods), box.observe, effort) for value in values]
     keys = [("search", *given) for given in arguments]
-    return ahead.values(keys, search_at, arguments, told)
+    return box.ahead.values(keys, search_at, arguments, told)
 
 
 def search_at(
@@ -554,7 +552,7 @@ def _follow_seeds(
     for number, seed in enumerate(seeds, 1):
         _follow_seed(box, seed, effort)
         box.reach("seeds", number)
-        if number == 1 and box.ahead is not None:  # which has compiled what the others need
+        if number == 1:  # which has compiled what the others need
             for other in seeds[1:]:
                 key, given = _seed_task(box, other, other.near, effort)
                 box.ahead.offer(key, search_at, *given)
@@ -568,8 +566,7 @@ def _follow_seed(box: Collector, seed: SubharmonicSeed, effort: OrbitSearchOptio
             continue
         box.tell(f"search 1/{seed.period}", value)
         key, given = _seed_task(box, seed, value, effort)
-        ahead = box.ahead or Ahead(box.flow)
-        failures, found = ahead.value(key, search_at, *given)
+        failures, found = box.ahead.value(key, search_at, *given)
         _note_failures(box, value, failures, effort)
         if orbits := found[seed.period]:
             box.from_orbits(orbits)

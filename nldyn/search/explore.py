@@ -37,6 +37,7 @@ from nldyn.orbits.starts import (
     random_states,
     settling_periods,
 )
+from nldyn.runtime.keeper import KeptFile
 from nldyn.runtime.prefetch import computing_ahead
 from nldyn.runtime.progress import Progress, shows_progress, silent
 from nldyn.runtime.threads import one_thread
@@ -63,18 +64,8 @@ AGAIN = 12  # times that a frequency is searched again while its indices say tha
 NEAR_ORBIT = 1e-4  # of a run's size: from its end to the orbit on which it lies
 
 
-class ExplorationFile(Protocol):
+class ExplorationFile(KeptFile, Protocol):
     """A file that keeps an exploration; `nldyn.io.CheckpointFile` is one."""
-
-    @property
-    def name(self) -> str:
-        """How messages call it."""
-
-    def exists(self) -> bool:
-        """Whether an earlier run has written it."""
-
-    def check_writable(self) -> None:
-        """Raise an `OutputError` if it cannot be written."""
 
     def read_exploration(self, system: System) -> Exploration:
         """The exploration of a system that it holds."""
