@@ -192,13 +192,7 @@ def family_over(
     """
     chosen = checked_parameter(orbit.system, FREQUENCY if parameter is None else parameter)
     chart = Chart.of(chosen, limits)
-    value = value_of(orbit.system, orbit.frequency_hz, chart.parameter)
-    slack = SLACK * max(abs(chart.low), abs(chart.high))
-    if not chart.low - slack <= value <= chart.high + slack:
-        raise SystemModelError(
-            f"the orbit at {told_value(chart.parameter, value)} lies outside {chart.range_name} = "
-            f"({chart.low:g}, {chart.high:g})"
-        )
+    chart.check_start(value_of(orbit.system, orbit.frequency_hz, chart.parameter))
     if not orbit.self_excited:
         return OrbitFamily.around(orbit, (chart,))
     if moves_frequency(chosen):
@@ -332,16 +326,13 @@ def complete(
     ) -> Leg:
         if leg is not None and not goes_on(leg, course):
             return leg
-        key = leg_key(first, course)
-        if leg is None and ahead.is_begun(key):
-            checkpoint.work = lambda: whole(None)
-            here = first.value
-            waiting = partial(progress, here) if progress else None
-            return ahead.value(key, walked_leg, first, course, meanwhile=waiting)
-        ahead.forget(key)
         trail = LegBuilder.going_on(leg or Leg.of(first), course)
         checkpoint.work = lambda: whole(trail.so_far())
-        return trail.follow(progress, kept)
+        return ahead.value(
+            leg_key(first, course),
+            lambda _: trail.follow(progress, kept),
+            meanwhile=progress and partial(progress, first.value),
+        )
 
     def kept() -> None:
         checkpoint.offer()

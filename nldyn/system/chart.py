@@ -515,12 +515,12 @@ class Chart:
         return f"the range of {parameter_name(self.parameter)}"
 
     def check_start(self, value: float) -> None:
-        """Refuse a start outside the range."""
+        """Refuse an orbit outside the range."""
         slack = SLACK * max(abs(self.low), abs(self.high))
         if not self.low - slack <= value <= self.high + slack:
             raise SystemModelError(
-                f"the start has {self.parameter.name} = {value:g}, outside its range "
-                f"({self.low:g}, {self.high:g})"
+                f"the orbit at {told_value(self.parameter, value)} lies outside {self.range_name} "
+                f"= ({self.low:g}, {self.high:g})"
             )
 
     @property

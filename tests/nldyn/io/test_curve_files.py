@@ -142,7 +142,7 @@ def test_an_extended_curve_is_the_curve_through_the_longer_range(kind, tmp_path)
     longer = short.extend(wide)
     assert len(longer.points) > len(short.points)
     assert_same_curves(longer, continue_special(found, pair, wide))
-    with pytest.raises(SystemModelError, match="outside its range"):
+    with pytest.raises(SystemModelError, match="lies outside the range"):
         short.extend((narrow[0], (0.0139, 0.0141)))
 
 
