@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -43,12 +43,13 @@ def marks_between(a: BranchNode, b: BranchNode) -> tuple[list[SpecialPoint], lis
     found: list[tuple[float, SpecialPoint]] = []
     notes: list[str] = []
     jumps = isinstance(a.condition, Turning) and bool(a.corner or b.corner)
-    for name, test in [] if jumps else _changes_of_sign(a, b):
+    for name in [] if jumps else _changes_of_sign(a, b):
         try:
-            sigma, error = root(lambda x, test=test: test(chord.at(x)))  # type: ignore[misc]
+            sigma, error = root(lambda x, name=name: curve_tests(chord.at(x))[name])  # type: ignore[misc]
             point = chord.at(sigma)
             least = NOISY if name == "GPD" else POLE
-            if abs(test(point)) > least * max(abs(test(a)), abs(test(b))):
+            before, here, after = (abs(curve_tests(node)[name]) for node in (a, point, b))
+            if here > least * max(before, after):
                 if name != "GPD":  # whose coefficient has a pole where a flip meets a fold
                     notes.append(_missing(name, a, "its test jumps there"))
                 continue
@@ -146,18 +147,11 @@ def _touches(a: BranchNode, b: BranchNode) -> list[list[Touch]]:
     return list(alike.values())
 
 
-def _changes_of_sign(
-    a: BranchNode, b: BranchNode
-) -> list[tuple[str, Callable[[BranchNode], float]]]:
-    """Tests that change sign between two points, with the names of what they tell of."""
+def _changes_of_sign(a: BranchNode, b: BranchNode) -> list[str]:
+    """Names of the tests that change sign between two points."""
     before, after = curve_tests(a), curve_tests(b)
-    names = [name for name in before if before[name] * after[name] < 0.0]
-    if not leaves_circle(a.orbit, b.orbit):
-        names = [name for name in names if name not in ("NS", "GRNS")]
-    return [
-        (name, lambda point, name=name: curve_tests(point)[name])  # type: ignore[misc]
-        for name in names
-    ]
+    rounding = () if leaves_circle(a.orbit, b.orbit) else ("NS", "GRNS")
+    return [name for name in before if before[name] * after[name] < 0.0 and name not in rounding]
 
 
 def _touch_name(condition: Condition) -> str:

@@ -367,8 +367,7 @@ def switch_at_branch_point(
 ) -> tuple[BranchNode, BranchNode]:
     """First points of the other branch through a branch point, one in either direction.
 
-    At a broken symmetry these are the two halves of the new branch; `nldyn.branches.leg.trace`
-    follows each of them.
+    At a broken symmetry these are the two halves of the new branch.
 
     Parameters
     ----------

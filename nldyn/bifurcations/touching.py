@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -66,16 +65,12 @@ def changes_hidden_by_birth(a: Orbit, b: Orbit) -> bool:
     return False
 
 
-def rigid_grazing(
-    orbit: Orbit, but: Callable[[int, float], bool] | None = None
-) -> tuple[int, float, float] | None:
+def rigid_grazing(orbit: Orbit) -> tuple[int, float, float] | None:
     """Rigid stop, phase and depth (in m) of the slightest impact or nearest miss; None without one.
 
-    The depth of an impact is its speed over ω. Those of which `but` (stop, phase) says so are left
-    out.
+    The depth of an impact is its speed over ω.
     """
-    found = [each for each in rigid_touches(orbit) if but is None or not but(*each[:2])]
-    return min(found, key=lambda entry: abs(entry[2]), default=None)
+    return min(rigid_touches(orbit), key=lambda entry: abs(entry[2]), default=None)
 
 
 def rigid_touches(orbit: Orbit) -> list[tuple[int, float, float]]:

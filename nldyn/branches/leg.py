@@ -27,7 +27,6 @@ from nldyn.bifurcations.within_step import insert_dip, special_points_between
 from nldyn.branches.arclength import Stepper, StepperState
 from nldyn.branches.branch import Course, WalkEnd
 from nldyn.branches.endings import Ending, StopReason
-from nldyn.branches.step_control import ContinuationOptions
 from nldyn.orbits.bordered import FREE, Solved, length_unit
 from nldyn.orbits.conditions import Turning, grazing_beside
 from nldyn.orbits.orbit import Orbit, same_orbit
@@ -429,35 +428,6 @@ def not_told_apart(found: Sequence[SpecialPoint]) -> list[str]:
         for group in groups
         if len(group) > 2 or (len(group) == 2 and "BP" in [s.kind for s in group])
     ]
-
-
-def trace(
-    start: BranchNode,
-    limits: tuple[float, float],
-    options: ContinuationOptions | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> tuple[list[BranchNode], list[SpecialPoint], str, list[str]]:
-    """Walk from a point in the direction of its tangent and collect special points.
-
-    Parameters
-    ----------
-    start : BranchNode
-        Where to begin.
-    limits : (float, float)
-        Values of the parameter between which to stay.
-    options : ContinuationOptions, optional
-        Step control.
-    progress : callable, optional
-        Called with the parameter's value at every point.
-
-    Returns
-    -------
-    nodes, special_points, reason, notes
-        As those of a `Leg`.
-    """
-    trail = LegBuilder(Stepper(start, limits, options or ContinuationOptions()))
-    leg = trail.follow(progress)
-    return leg.nodes, leg.special_points, leg.reason, leg.notes
 
 
 def _detour(

@@ -177,10 +177,9 @@ class Axis:
         """From one value to another, in words."""
         return self.told(low, high, digits=digits).replace(" and ", " to ")
 
-    def told_ranges(self, ranges: Sequence[tuple[float, float]], digits: int = 4) -> str:
+    def told_ranges(self, ranges: Sequence[tuple[float, float]]) -> str:
         """Ranges of values, with the unit once: ``5-6, 7 Hz``."""
-        listed = [f"{a:.{digits}g}-{b:.{digits}g}" if a < b else f"{a:.{digits}g}"
-                  for a, b in ranges]  # fmt: skip
+        listed = [f"{a:.4g}-{b:.4g}" if a < b else f"{a:.4g}" for a, b in ranges]
         return with_unit(self.parameter, ", ".join(listed))
 
     @property

@@ -321,11 +321,6 @@ class ForcedResponse:
         return float((weights @ np.abs(self.amplitudes)).max())
 
 
-def at_resonance(eigenvalues: Complex, omega: float | Real) -> NDArray[np.bool_]:
-    """Which eigenvalues are iω but for rounding: of an undamped mode at its own frequency."""
-    return np.asarray(np.abs(eigenvalues - 1j * omega) < _ROUNDED * omega)
-
-
 def diagonalised(omega: Real, added: Real) -> tuple[Real, Real]:
     """Circular frequencies (n,) and modes (n, n) of modes with a symmetric stiffness (n, n) added.
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from legs import leg_from
 from problems import in_frequency, make_one_dof, torus_system
 
 from nldyn import (
@@ -43,7 +44,6 @@ from nldyn.bifurcations.normal_forms import is_symmetric, resonance, switch_at_b
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.point import SpecialPoint
 from nldyn.branches.cascades import FEIGENBAUM, cascades_in
-from nldyn.branches.leg import trace
 from nldyn.orbits.newton import refine
 from nldyn.orbits.shooting import shooting_problem
 
@@ -292,7 +292,7 @@ def test_subcritical_flip(harmonic_branch):
     special = next(s for s in of_kind(harmonic_branch, "PD") if 12.0 < s.frequency_hz < 13.0)
     told = normal_form(special)
     assert told.name == "subcritical flip" and told.side == -1 and told.stable is False
-    nodes, *_ = trace(switch_at_flip(special), (12.0, 13.0))
+    nodes = leg_from(switch_at_flip(special), (12.0, 13.0)).nodes
     assert nodes[1].orbit.frequency_hz < special.frequency_hz
     assert not nodes[1].orbit.stable
 
@@ -597,7 +597,7 @@ def test_flips_of_a_cascade_are_those_of_the_diagram():
     system = make_one_dof()
     branch = continue_branch(solve_orbit(system, 33.0), (32.0, 34.0))
     found = cascade(of_kind(branch, "PD")[0], 1)
-    _, special, *_ = trace(switch_at_flip(of_kind(branch, "PD")[0]), (33.0, 35.0))
+    special = leg_from(switch_at_flip(of_kind(branch, "PD")[0]), (33.0, 35.0)).special_points
     first = next(s for s in special if s.kind == "PD")
     assert found.flips[1].frequency_hz == pytest.approx(first.frequency_hz, rel=1e-9)
 

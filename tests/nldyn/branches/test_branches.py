@@ -8,6 +8,7 @@ import pickle
 import numpy as np
 import pytest
 from independent import Motion
+from legs import leg_from
 from problems import RANGE_HZ, in_frequency, make_one_dof, torus_system
 from scipy.optimize import minimize_scalar
 
@@ -31,7 +32,6 @@ from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.continuation import start_point
-from nldyn.branches.leg import trace
 from nldyn.branches.peaks import lowest_orbit, resonance_peaks
 from nldyn.orbits import OrbitSearchOptions
 from nldyn.orbits.bordered import FREE
@@ -75,7 +75,8 @@ def test_doubled_branch_joins_two_flips(harmonic_branch):
     """From the flip at 8.71 Hz to the one at 10.43 Hz, both ways round."""
     low, high = (f for f in flips(harmonic_branch) if 8.0 < f.frequency_hz < 11.0)
     for first, last in ((high, low), (low, high)):
-        nodes, _, reason, _ = trace(switch_at_flip(first), (5.7, 90.0))
+        leg = leg_from(switch_at_flip(first), (5.7, 90.0))
+        nodes, reason = leg.nodes, leg.reason
         assert reason.startswith("joins the branch of period 1 at the flip")
         end = nodes[-1].orbit
         assert end.frequency_hz == pytest.approx(last.frequency_hz, rel=1e-12)
@@ -165,7 +166,8 @@ def test_flip_that_is_not_found_leaves_no_point_twice(harmonic_branch, monkeypat
     flip = next(f for f in flips(harmonic_branch) if 8.0 < f.frequency_hz < 11.0)
     start = switch_at_flip(flip)
     monkeypatch.setattr("nldyn.bifurcations.period_doubling.correct", fails)
-    nodes, _, reason, _ = trace(start, (5.7, 90.0))
+    leg = leg_from(start, (5.7, 90.0))
+    nodes, reason = leg.nodes, leg.reason
     assert reason.startswith("meets the branch of period 1 beyond 10.4")
     assert np.all(np.diff([node.arclength for node in nodes]) > 0.0)
 

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from legs import leg_from
 from problems import RANGE_HZ, between_stops, make_one_dof, torus_system
 
 from nldyn import (
@@ -35,7 +36,6 @@ from nldyn.bifurcations import codimension_two as codimension
 from nldyn.bifurcations.codimension_two import along_tori, flip_coefficient, is_torus
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.branches.endings import Ending
-from nldyn.branches.leg import trace
 from nldyn.curves import refine_special
 from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.conditions import Singular, bialternate, max_abs_displacement, peak_force
@@ -357,7 +357,7 @@ def test_folds_of_a_linear_stop_scale_with_unbalance_and_gap():
 def test_flips_of_doubled_orbits_scale_with_force_and_stiffness(harmonic_branch):
     """Without a gap, force times s and stiffness times s^(1-p) give displacements times s."""
     start = switch_at_flip(of_kind(harmonic_branch, "PD", 33.0)[0])
-    _, located, _, _ = trace(start, (27.0, 40.0))
+    located = leg_from(start, (27.0, 40.0)).special_points
     special = next(s for s in located if s.kind == "PD")
     assert special.orbit.period == 2
     curve = continue_special(

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bilinear import Bilinear, PiecewiseOrbit
+from legs import leg_from
 
 from nldyn import continue_branch, continue_special, solve_orbit
 from nldyn.bifurcations.period_doubling import switch_at_flip
-from nldyn.branches.leg import trace
 
 OSCILLATOR = Bilinear(damping=0.04, stiffness=1.0, stop=40.0, gap=0.0, force=1.0)
 MULTIPLIER = {"LP": 1, "PD": -1}
@@ -59,7 +59,7 @@ def test_every_special_point_of_the_branch_is_where_the_piecewise_solution_has_i
 
 def test_flip_of_doubled_orbits_is_where_the_piecewise_solution_has_it(branch):
     start = switch_at_flip(branch.special_points[-1])
-    _, located, _, _ = trace(start, (0.2, 0.6))
+    located = leg_from(start, (0.2, 0.6)).special_points
     special = next(s for s in located if s.kind == "PD")
     assert special.orbit.period == 2
     expected = exact_frequency("PD", special.orbit)
