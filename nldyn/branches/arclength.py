@@ -169,7 +169,9 @@ class Stepper:
         assert self.stride is not None
         here, there, step = self.stride.here, made.there, made.step
         bent = step <= KINK and (
-            there.orbit.impacts != here.orbit.impacts or there.orbit.system.jumps
+            here.condition is not FREE  # whose slopes are coarse
+            or there.orbit.impacts != here.orbit.impacts
+            or there.orbit.system.jumps
         )
         bent = bent or passes_node(here, there) or bool(there.corner or made.way[0].corner)
         trail = np.concatenate([here.point[None], here.tangent[None], self.stride.behind])
