@@ -68,6 +68,8 @@ def crossings(places: Places, value: float) -> list[BranchNode]:
     SystemModelError
         If the parameter cannot have this value.
     """
+    chart = places.points[0].family.charts[0]
+    check_value("frequency_hz" if chart.parameter.name == FREQUENCY else "value", chart, value)
     return _crossings(places, value)[0]
 
 
@@ -161,7 +163,6 @@ def _arclength(point: BranchNode) -> float:
 
 def _crossings(places: Places, value: float) -> tuple[list[BranchNode], list[str]]:
     chart = places.points[0].family.charts[0]
-    check_value("frequency_hz" if chart.parameter.name == FREQUENCY else "value", chart, value)
     if places.points[0].condition is not FREE:
         return list(met_on_curve(places.points, 0, value)), []
     p = chart.coordinate(value)

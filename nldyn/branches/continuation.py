@@ -155,7 +155,6 @@ def continue_branch(
             raise SystemModelError(
                 "continue_branch: an orbit needs limits, the range of its parameter"
             )
-        check_minimal(start)
         family = family_over(start, limits, parameter)
         avoided = alike(family, [numbers("open_ends", end) for end in open_ends])
         further = tuple((other.low, other.high) for other in family.charts[1:])
@@ -187,9 +186,10 @@ def family_over(
     Raises
     ------
     SystemModelError
-        If the range is empty or does not hold the orbit, there is no such parameter, or it is the
-        frequency of a self-excited motion.
+        If the range is empty or does not hold the orbit, there is no such parameter, it is the
+        frequency of a self-excited motion, or the orbit is one of a shorter period.
     """
+    check_minimal(orbit)
     chosen = checked_parameter(orbit.system, FREQUENCY if parameter is None else parameter)
     chart = Chart.of(chosen, limits)
     chart.check_start(value_of(orbit.system, orbit.frequency_hz, chart.parameter))
