@@ -120,7 +120,7 @@ class BranchNode:
         return replace(self, tangent=-self.tangent, arclength=-self.arclength, tests={})
 
 
-def node_of(found: Corrected, towards: Real, arclength: float) -> BranchNode:
+def node_of(found: Corrected, towards: Real, arclength: float, corner: str = "") -> BranchNode:
     """Point of a branch or curve from a solution, its tangent on the side of a vector."""
     tangent, condition = found.tangent(towards), found.condition.renewed(found.at)
     family = found.family
@@ -128,7 +128,9 @@ def node_of(found: Corrected, towards: Real, arclength: float) -> BranchNode:
         family = family.past(condition.passages)
     elif isinstance(condition, Phase):  # fed by what makes it larger
         family = family.unfolded(family.from_origin(found.point))
-    return BranchNode(family, found.point, found.orbit, tangent, arclength, condition=condition)
+    return BranchNode(
+        family, found.point, found.orbit, tangent, arclength, condition=condition, corner=corner
+    )
 
 
 @dataclass(frozen=True, eq=False)
