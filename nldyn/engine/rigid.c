@@ -494,6 +494,21 @@ static void find_jammed(Motion *M, double phase)
     }
 }
 
+/* the same of a rigid stop that holds what a slider at another stop would hold, too: how much of it
+ * each takes is not told, nor what rubs on the rigid stop then */
+static void find_shared(Motion *M)
+{
+    const Flow *fl = M->fl;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!is_slider(fl, s) || !is_pressed(fl, s) || is_sprung(fl, s) || M->closed[s]) continue;
+        if (!M->closed[(int)stop_of(fl, s)->normal] || grip(fl, s) == 0.0) continue;
+        for (int r = 0; r < fl->n_stops; r++) {
+            int rubbing = is_rigid(fl, r) && M->closed[r] && moves_with(fl, s, r) ? rubbed_by(fl, r) : -1;
+            if (rubbing >= 0 && M->closed[rubbing] && grip(fl, rubbing) > 0.0) M->undecided = r;
+        }
+    }
+}
+
 /* Close the rigid stops on which the body rests now and open the others. A gap and a rate of so
  * many `roundings` are none. Resting is what is shut, does not part and is pushed on, together
  * with all that does: stops that would have to pull are left out one by one. */
@@ -518,6 +533,7 @@ static void settle(Motion *M, int first, double phase, double t, const double *s
         M->closed[weakest] = false;
         hand_over_sliders(M, phase, roundings);
     }
+    find_shared(M);
     hold(M, phase, t, shift);
 }
 

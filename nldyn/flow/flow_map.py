@@ -83,9 +83,9 @@ _REASONS = {
     OTHER_CONTACTS: "the number of contacts changes within the step",
     SLIDING_TURNS: "the whirl takes the sliding speed in a round clearance through zero: there the "
     "surface would stick or slide the other way, which is not known",
-    UNDECIDED: "friction at the rigid stop at '{at}' (stop {stop}) is so large that no force, or "
-    "more than one, holds what rests on it at phase {phase:.6g} rad: what happens there is not "
-    "decided (Painlevé's paradox)",
+    UNDECIDED: "with the friction at the rigid stop at '{at}' (stop {stop}) no force, or more than "
+    "one, holds what rests on it at phase {phase:.6g} rad, since it is so large (Painlevé's "
+    "paradox) or friction at another stop shares that force: what happens there is not decided",
 }
 
 
