@@ -553,7 +553,7 @@ def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
         yield ("springs", number, "at"), spring.at
     for kind in ("stops", "friction", "dampers", "springs"):
         for number, entry in enumerate(getattr(scene, kind)):
-            if entry.against is not None:
+            if getattr(entry, "against", None) is not None:
                 yield (kind, number, "against"), entry.against
     for number, area in enumerate(scene.contact_areas):
         if isinstance(area, ListedAreaTable):

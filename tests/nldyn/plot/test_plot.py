@@ -42,6 +42,7 @@ OF_ROTATIONS = {
     "N/m": "N m/rad",
     "N s/m": "N m s/rad",
     "s/m": "s/rad",
+    "m/s": "rad/s",
     "N/m$^p$": "N m/rad$^p$",
     "N/m$^p$ per m² or m": "N m/rad$^p$ per m² or m",
     "kg m": "kg m²",
