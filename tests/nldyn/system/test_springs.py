@@ -249,7 +249,11 @@ def test_rest_positions_that_there_are_not():
         ("coefficients = [-8.0, 0.0, 2.0]", "coefficients = [0.0]", "not all zero"),
         ("coefficients = [-8.0, 0.0, 2.0]", "", "needs one of 'stiffness' and 'coefficients'"),
         ('law = "cubic"\ncoefficient = 0.2', 'law = "cubic"\ncoefficient = 0.0', "above 0"),
-        ('against = "a"\ncoefficients', 'direction = "x"\ncoefficients', "is not a key of a spring with a 'direction'"),
+        (
+            'against = "a"\ncoefficients',
+            'direction = "x"\ncoefficients',
+            "is not a key of a spring with a 'direction'",
+        ),
     ],
 )
 def test_springs_that_make_no_sense_in_a_scene(old, new, words):
