@@ -21,6 +21,7 @@ found.find_spec = lambda name, *more: None if name in {hidden} else known(name, 
 sys.meta_path.insert(0, Hidden())
 """
 REPORT, RENDER = ("matplotlib", "plotly"), ("pyvista", "vtkmodules", "imageio")
+OF_TESTS = ("meshio", "gmsh")
 COMMAND = "from nldyn.app.cli import main; main(sys.argv[1:])"
 
 
@@ -56,7 +57,7 @@ branch = continue_branch(solve_orbit(system, frequency_hz=33.0), (33.0, 34.0))
 save(branch, "branch.h5")
 print([point.kind for point in load("branch.h5")[0].special_points])
 """
-    run = without((*REPORT, *RENDER), code, folder=tmp_path)
+    run = without((*REPORT, *RENDER, *OF_TESTS), code, folder=tmp_path)
     assert run.stdout == "['PD']\n", run.stderr
 
 
@@ -73,7 +74,7 @@ import numpy as np
 fem.render.write_page(bar, np.zeros((bar.stiffness.shape[0], 1)), ["rest"], "bar.html")
 """
     run = without(RENDER, code, folder=tmp_path)
-    said = "what is drawn of a mesh needs pyvista and imageio, which is not installed: "
+    said = "what is drawn of a mesh needs pyvista and imageio, which are not installed: "
     assert run.stdout.startswith(said)
     assert run.stderr.splitlines()[-1].startswith(f"fem.render.gl.RenderError: {said}")
 

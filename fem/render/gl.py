@@ -29,7 +29,7 @@ PROBE = textwrap.dedent(
 PROBE_SECONDS = 180.0
 
 
-MISSING = 'what is drawn of a mesh needs {}, which is not installed: pip install "nldyn[render]"'
+MISSING = 'what is drawn of a mesh needs {}, which {} not installed: pip install "nldyn[render]"'
 LIBRARIES = ("pyvista", "imageio")
 
 
@@ -72,7 +72,8 @@ def gl_available() -> tuple[bool, str]:
 def missing_library() -> str:
     """One sentence on what is not installed of what draws meshes; empty if nothing is missing."""
     missing = [name for name in LIBRARIES if find_spec(name) is None]
-    return MISSING.format(" and ".join(missing)) if missing else ""
+    told = MISSING.format(" and ".join(missing), "are" if len(missing) > 1 else "is")
+    return told if missing else ""
 
 
 @functools.cache
