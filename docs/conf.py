@@ -10,7 +10,7 @@ sys.path[:0] = [str(HERE / "_site"), str(HERE.parent)]
 from nldyn.base.version import software_version  # noqa: E402
 
 project = "nldyn"
-author = "the authors of nldyn"
+author = "the nldyn developers"
 release = software_version()
 extensions = [
     "myst_parser",
