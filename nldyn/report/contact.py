@@ -30,8 +30,8 @@ def contact_figure(diagram: Diagram, scene: Scene | None = None) -> Figure | Non
     Parameters
     ----------
     diagram : Diagram
-        Its orbit that loses most by friction per period of the excitation is drawn; where nothing
-        rubs, the one whose areas are pressed hardest.
+        Its orbit that loses most by friction per period of the excitation is drawn; where none
+        does, the one whose contacts press hardest.
     scene : Scene, optional
         Tells where the points of areas are.
 
@@ -44,8 +44,9 @@ def contact_figure(diagram: Diagram, scene: Scene | None = None) -> Figure | Non
     system = orbits[0].system if orbits else None
     if system is None or not (system.areas or system.rubbing):
         return None
-    orbit = max(orbits, key=_size)
-    if _size(orbit) == 0.0:
+    size = _lost if any(map(_lost, orbits)) else _pressed
+    orbit = max(orbits, key=size)
+    if size(orbit) == 0.0:
         return None
     parts = _parts(orbit, _where(scene))
     figure = file_figure(SIZE[0], SIZE[1] * len(parts))
@@ -81,10 +82,13 @@ def png_of(figure: Figure | None) -> str:
     return base64.b64encode(file.getvalue()).decode("ascii")
 
 
-def _size(orbit: Orbit) -> float:
-    """What an orbit loses by friction per excitation period, or its hardest contact."""
-    if orbit.system.rubbing:
-        return sum(each.loss for each in orbit.friction) / orbit.period
+def _lost(orbit: Orbit) -> float:
+    """What an orbit loses by friction per excitation period."""
+    return sum(each.loss for each in orbit.friction) / orbit.period
+
+
+def _pressed(orbit: Orbit) -> float:
+    """Its hardest contact."""
     return max((hit.force or 0.0 for hit in orbit.impact_list), default=0.0)
 
 

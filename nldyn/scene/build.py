@@ -465,16 +465,11 @@ def _check_rides(scene: Scene, system: System) -> None:
     if scene.modal is not None:
         return
     bases = [source for source in system.excitation if isinstance(source, BaseMotion)]
-    tables = ("stops", "friction", "springs", "dampers", "round_clearances")
-    for table in tables if bases else ():
-        for number, element in enumerate(getattr(scene, table)):
-            for at, against in element.ends:
-                if against is None:
-                    continue
-                some, other = (_carried(scene, system, end) for end in (at, against))
-                if carried_apart(bases, some, other):
-                    told = told_apart(table, number, at, against)
-                    raise scene_error(scene.file, (), told, sep=": ")
+    for table, number, at, against in scene.ties if bases else ():
+        some, other = (_carried(scene, system, end) for end in (at, against))
+        if carried_apart(bases, some, other):
+            told = told_apart(table, number, at, against)
+            raise scene_error(scene.file, (), told, sep=": ")
 
 
 def _carried(scene: Scene, system: System, interface: str) -> dict[str, float]:

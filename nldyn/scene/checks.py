@@ -149,14 +149,11 @@ def _unknown_rides(scene: Scene) -> Iterator[str]:
     """Name what ties two places of which nobody knows how a moving base carries them."""
     if scene.modal is None or not any(table.kind == "base" for table in scene.excitation):
         return
-    for table in ("stops", "springs", "dampers", "round_clearances"):
-        for number, element in enumerate(getattr(scene, table)):
-            for at, against in element.ends:
-                if against is not None:
-                    yield (
-                        f"{table}[{number}]: displacements are relative to the base, and modes do "
-                        f"not tell whether it carries '{at}' and '{against}' alike, as it must"
-                    )
+    for table, number, at, against in scene.ties:
+        yield (
+            f"{table}[{number}]: displacements are relative to the base, and modes do not tell "
+            f"whether it carries '{at}' and '{against}' alike, as it must"
+        )
 
 
 def _unused(scene: Scene) -> Iterator[str]:

@@ -64,6 +64,11 @@ class MeshSpringTable(Table):
     stiffness: Positive
     """[N/m, N m/rad] Stiffness."""
 
+    @property
+    def ends(self) -> list[tuple[str, str | None]]:
+        """None: no interface is at an end."""
+        return []
+
 
 _MESH, _INTERFACE = "a spring with a 'direction'", "a spring at an interface"
 AnySpringTable = Annotated[

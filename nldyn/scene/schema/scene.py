@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,15 @@ class Scene(StructureTables):
     def interface_springs(self) -> dict[int, SpringTable]:
         """The others, which act at interfaces."""
         return {n: each for n, each in enumerate(self.springs) if isinstance(each, SpringTable)}
+
+    @property
+    def ties(self) -> Iterator[tuple[str, int, str, str]]:
+        """Table, number in it and both interfaces of all that lies between two."""
+        for table in ("stops", "friction", "springs", "dampers", "round_clearances"):
+            for number, element in enumerate(getattr(self, table)):
+                for at, against in element.ends:
+                    if against is not None:
+                        yield table, number, at, against
 
     @property
     def interface_names(self) -> list[str]:

@@ -1,0 +1,32 @@
+"""Which orbit the picture of contact shows."""
+
+import numpy as np
+import pytest
+
+from nldyn import HarmonicForce, System, contact_area, continue_branch, solve_orbit
+from nldyn.report.contact import contact_figure
+from nldyn.search.diagram import Diagram
+
+
+def drawn(friction, gap):
+    """Two points that a force presses against a plane, and does not move along it."""
+    names = ("a", "b", "ta", "tb")
+    system = System.from_modal(
+        [1.0, 1.3, 1.7, 2.1], dict(zip(names, np.eye(4), strict=True)), modal_damping=0.1,
+        stops=contact_area("pad", ["a", "b"], 50.0, gap=gap, friction=friction,
+                           tangents=["ta", "tb"] if friction else None),
+        excitation=[HarmonicForce("a", 30.0)],
+    )  # fmt: skip
+    branch = continue_branch(solve_orbit(system, 0.7), (0.69, 0.71))
+    return branch, contact_figure(Diagram((branch,), (0.69, 0.71), "a"))
+
+
+@pytest.mark.parametrize("friction", [None, 0.3])
+def test_what_is_pressed_is_drawn_where_nothing_slides(friction):
+    branch, figure = drawn(friction, 0.1)
+    largest = max(orbit.areas[0].pressure.max() for orbit in branch.points)
+    assert max(figure.axes[0].lines[0].get_ydata()) == pytest.approx(largest, rel=1e-9)
+
+
+def test_nothing_is_drawn_where_nothing_touches():
+    assert drawn(0.3, 9.0)[1] is None
