@@ -299,6 +299,11 @@ class FlowMap:
         columns = [self.system.force_column(v) for v in self._pushed]
         return np.ascontiguousarray(np.array(columns).reshape(-1, self.system.state_size).T)
 
+    def mobility(self, outputs: Sequence[int]) -> Real:
+        """Speeds (k, k) at stops, sliders and bonds that unit impulses at them take, by columns."""
+        rows = list(outputs)
+        return np.asarray(self.rate_rows[rows] @ self.force_columns[:, rows])
+
     def ride(self, output: int, omega: float) -> Ride:
         """What a moving base adds to an output at ω, see `System.with_absolute`."""
         s = self.system

@@ -51,10 +51,11 @@ def impacts_in_order(motion: Trajectory) -> list[tuple[int, float]]:
             for piece, speed in zip(hit.piece, hit.speed, strict=True)]  # fmt: skip
     several = {piece for piece, *_ in hits if sum(other == piece for other, *_ in hits) > 1}
     listed = [(stop, speed) for piece, stop, speed in hits if piece not in several]
-    mobility = flow.rate_rows @ flow._data.force[:, : len(system.stops)]
+    stops = range(len(system.stops))
+    mobility, rates = flow.mobility(stops), flow.rate_rows[: len(stops)]
     for piece in several:
         before = states_before(motion, np.array([piece]))[0]
-        speeds = flow.rate_rows @ before
+        speeds = rates @ before
         shut = [stop for other, stop, _ in hits if other == piece]
         while True:
             hit = max(shut, key=lambda stop: speeds[stop])
@@ -140,9 +141,9 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
         pushed = stop.force(*system.depth_and_speed(stop, modal))
         if isinstance(stop, RoundStop):
             along = stop.along(system.round_polar(stop, modal))
-            rates -= pushed[:, None] * along @ data.force[:, flow.round_rows[i]].T
+            rates -= pushed[:, None] * along @ flow.force_columns[:, flow.round_rows[i]].T
         else:
-            rates -= pushed[:, None] * data.force[:, i]
+            rates -= pushed[:, None] * flow.force_columns[:, i]
     first = len(system.stops)
     rubs = np.zeros((len(phases), first))  # friction per unit of the force of a rigid stop
     holds = np.zeros((len(phases), len(system.sliders)), dtype=bool)
@@ -162,14 +163,13 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
             speed = states @ flow.rate_rows[i] - slider.friction.base_speed
             law = np.sign(friction.sum(axis=1)) * slider.friction.at(speed)
             pulled = np.where(sticks, 0.0, law) * normal
-        rates -= pulled[:, None] * data.force[:, i]
+        rates -= pulled[:, None] * flow.force_columns[:, i]
     for i, bond in enumerate(system.bonds, first + len(system.sliders)):
         pulled = bond.force(states @ flow.rows[i], states @ flow.rate_rows[i])
-        rates -= pulled[:, None] * data.force[:, i]
+        rates -= pulled[:, None] * flow.force_columns[:, i]
     acting = np.r_[rigid, first : first + len(system.sliders)]
-    rows = flow.rate_rows[acting]
-    pace = states @ data.rows[2, acting].T + rates @ rows.T
-    mobility = rows @ data.force[:, acting]
+    pace = states @ data.rows[2, acting].T + rates @ flow.rate_rows[acting].T
+    mobility = flow.mobility(acting.tolist())
     for k in np.flatnonzero(rests.any(axis=1)):
         held = np.flatnonzero(np.r_[rests[k], holds[k]])
         taken = mobility.copy()

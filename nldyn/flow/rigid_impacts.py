@@ -103,20 +103,23 @@ def _impulses(
     number = slider_of(flow.system, stop)
     if number is None:
         none = np.zeros(jump.shape)
-        own = float(flow.rate_rows[stop] @ flow.force_columns[:, stop])
-        return np.array([jump / own, none]), np.array([none, none])
-    rows = [stop, len(flow.system.stops) + number]
+        return np.array([jump / flow.mobility([stop])[0, 0], none]), np.array([none, none])
+    row = flow.rate_rows[len(flow.system.stops) + number]
     belt = flow.system.sliders[number].friction.base_speed
-    slips = np.array([states @ flow.rate_rows[rows[1]] - belt for states in (before, behind)])
-    mobility = flow.rate_rows[rows] @ flow.force_columns[:, rows]
-    return np.linalg.solve(mobility, np.array([jump, slips[0] - slips[1]])), slips
+    slips = np.array([states @ row - belt for states in (before, behind)])
+    jumps = np.array([jump, slips[0] - slips[1]])
+    return np.linalg.solve(_mobility(flow, stop, number), jumps), slips
+
+
+def _mobility(flow: FlowMap, stop: int, number: int) -> Real:
+    """Speeds (2, 2) of closing and sliding that impulses along the normal and of friction take."""
+    return flow.mobility([stop, len(flow.system.stops) + number])
 
 
 def _turns(flow: FlowMap, number: int, hits: RigidImpacts) -> Real:
     """Normal impulses (k,) in N s at which sliding comes to rest or turns, or those at the end."""
     slider = flow.system.sliders[number]
-    rows = [slider.stop, len(flow.system.stops) + number]
-    (_, both), (_, along) = flow.rate_rows[rows] @ flow.force_columns[:, rows]
+    (_, both), (_, along) = _mobility(flow, slider.stop, number)
     sense, mu = np.sign(hits.slip), slider.friction.coefficient
     turns = sense * hits.slip_behind <= ROUNDED * np.abs(hits.slip)
     slowed = np.where(turns & (sense != 0.0), sense * both + mu * along, 1.0)
@@ -153,8 +156,7 @@ def compression_works(flow: FlowMap, stop: int, hits: RigidImpacts) -> Real:
     work = 0.5 * ends * hits.speed
     if number is None:
         return work
-    rows = [stop, len(flow.system.stops) + number]
-    (own, both), _ = flow.rate_rows[rows] @ flow.force_columns[:, rows]
+    (own, both), _ = _mobility(flow, stop, number)
     turn = _turns(flow, number, hits)
     share = np.sign(hits.slip) * flow.system.sliders[number].friction.coefficient
     kink = hits.speed - (own + share * both) * turn

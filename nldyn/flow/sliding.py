@@ -123,7 +123,7 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
     ways = np.diff(place)[panels] - slider.friction.base_speed * duration
     size = np.abs(place).max() + np.abs(slider.friction.base_speed * duration).max(initial=0.0)
     held = held_in_pieces(motion, number)[panels]
-    mobility = float(flow.rate_rows[output] @ flow.force_columns[:, output])
+    mobility = float(flow.mobility([output])[0, 0])
     pulled = np.where(held, mobility * np.abs(force).max(axis=1, initial=0.0) * duration**2, 0.0)
     slides = np.abs(ways) > np.where(held, UNMOVED, ROUNDING) * (size + pulled)
     along = np.column_stack([place[panels], inner, place[panels + 1]])[slides]
@@ -209,7 +209,7 @@ def held_in_pieces(motion: Trajectory, number: int) -> NDArray[np.bool_]:
     output = len(flow.system.stops) + number
     if number in flow.system.sprung:
         return np.zeros(rec.phase.size, dtype=bool)
-    mobility = float(flow.rate_rows[output] @ flow.force_columns[:, output])
+    mobility = float(flow.mobility([output])[0, 0])
     inner = rec.depth[:, output]
     off = np.abs(inner - mobility * rec.force[:, output]).max(axis=1)
     return np.asarray(off <= ALIKE * np.abs(inner).max(axis=1))
