@@ -53,6 +53,7 @@ from nldyn.orbits.conditions import UNFOLDED, BranchPointCondition, Held, Turnin
 from nldyn.orbits.multipliers import EPS
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import FROM_NEAR, metric_length, shifts
+from nldyn.system.chart import told_value
 
 MOST_BEHIND = 4  # points behind the last one that tell where a branch goes on
 LOOKS_BACK = 4  # steps between two looks whether a walk has been there before
@@ -226,12 +227,15 @@ class Stepper:
     def too_short(self) -> StopReason:
         """The reason to stop where no step leads on."""
         if self.stride is not None:
-            resonance = _resonance_beside(self.stride.here.orbit)
+            here = self.stride.here
+            resonance = _resonance_beside(here.orbit)
             if resonance is not None:
-                return Ending.GROWS.told(place=f"{resonance:.9g} Hz")
-            share = _rounding(self.stride.here)
+                alone = here.family.in_frequency_alone
+                place = f"{resonance:.9g} Hz" if alone else _beside(here)
+                return Ending.GROWS.told(place=place)
+            share = _rounding(here)
             if share > LOST_IN_ROUNDING:
-                place = place_of(self.stride.here)
+                place = place_of(here)
                 return Ending.LOST_IN_ROUNDING.told(place=place, share=f"{share:.1g}")
         return Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
 
@@ -612,6 +616,16 @@ def _resonance_beside(orbit: Orbit) -> float | None:
     if orbit.impacts or orbit.max_penetration > 0.0:
         return None
     return orbit.system.response(orbit.omega).resonance_hz(orbit.omega, BESIDE_RESONANCE)
+
+
+def _beside(here: BranchNode) -> str:
+    """Values of what is followed in words, to as many digits as `BESIDE_RESONANCE` leaves."""
+    digits = -round(math.log10(BESIDE_RESONANCE))
+    pairs = [
+        (chart.parameter, chart.value(round(chart.coordinate(value), digits) + 0.0))
+        for chart, value in zip(here.family.charts, here.values.tolist(), strict=True)
+    ]
+    return ", ".join(told_value(*pair) for pair in pairs)
 
 
 def _rounding(here: BranchNode) -> float:

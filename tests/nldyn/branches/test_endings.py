@@ -45,6 +45,16 @@ def test_an_undamped_resonance_is_told(start, end):
     assert branch.stop_reasons[1 - end].ending is Ending.RANGE_END
 
 
+def test_damping_followed_to_none_at_a_resonance_names_the_damping():
+    system = System.from_modal(
+        [13.1], {"x": [1.0]}, modal_damping=0.02, excitation=[HarmonicForce("x", 1.0)]
+    )
+    branch = continue_branch(solve_orbit(system, 13.1), (0.0, 0.03), parameter="modal_damping")
+    reason = branch.stop_reasons[0]
+    assert reason.ending is Ending.GROWS
+    assert reason.startswith("grows without bound towards modal_damping = 0, where")
+
+
 def test_an_undamped_motion_that_a_stop_limits_is_lost_in_rounding():
     """Beyond the stop, the force of 1 N holds a motion of 10 MN: it keeps to the free vibration.
 
