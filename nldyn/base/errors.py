@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from contextlib import ContextDecorator
+from difflib import get_close_matches
 from numbers import Integral, Real
 from reprlib import repr as shortened
 from typing import Any, TypeGuard
@@ -32,6 +33,12 @@ class SceneError(ValueError):
 def shown(value: object) -> str:
     """A value as an error text shows it: shortened to about 40 characters."""
     return shortened(value)
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """Give the known name that ``name`` is most likely a typing error of."""
+    matches = get_close_matches(name.lower(), list(known), n=1, cutoff=0.6)
+    return matches[0] if matches else None
 
 
 def is_finite(value: object) -> TypeGuard[float]:

@@ -253,7 +253,8 @@ def over_range(
     course = branch.course
     if course is None:
         raise SystemModelError(
-            f"branch '{branch.name}' cannot be extended: it does not tell how it was continued"
+            f"branch '{branch.name}' cannot be extended: it does not tell how it was continued; "
+            "follow one of its points anew"
         )
     if parameter not in (None, branch.parameter, branch.parameter.name):
         raise SystemModelError(

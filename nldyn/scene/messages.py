@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -12,7 +11,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import BaseModel, Tag, ValidationError
 from pydantic_core import ErrorDetails
 
-from nldyn.base.errors import SceneError
+from nldyn.base.errors import SceneError, nearest
 
 KeyPath = tuple[str | int, ...]
 MOST_SHOWN, LONGEST_SHOWN = 20, 60  # names in a list, letters of a name
@@ -110,12 +109,6 @@ def quoted(names: Iterable[str]) -> str:
     text = ", ".join(f"'{shortened(name)}'" for name in every[:MOST_SHOWN])
     more = len(every) - MOST_SHOWN
     return (text or "none") + (f" and {more} more" if more > 0 else "")
-
-
-def nearest(name: str, known: Iterable[str]) -> str | None:
-    """Give the known name that ``name`` is most likely a typing error of."""
-    matches = difflib.get_close_matches(name.lower(), list(known), n=1, cutoff=0.6)
-    return matches[0] if matches else None
 
 
 def unknown_name(name: str, known: Iterable[str], what: str) -> str:

@@ -15,11 +15,13 @@ from nldyn.base.errors import (
     SMALLEST_FREQUENCY,
     SystemModelError,
     is_finite,
+    nearest,
     shown,
 )
 from nldyn.system.friction import DryFriction
 from nldyn.system.naming import turned
 from nldyn.system.parameters import (
+    EXACT,
     OF_AREAS,
     OF_ROUND,
     OF_SLIDERS,
@@ -38,15 +40,11 @@ FREQUENCY = "frequency_hz"
 SPIN, SPEED = "spin_hz", "speed_hz"  # of a shaft; the same with the excitation, once per turn
 EVERY_MODE = -1
 
-_OF_STOPS = OF_STOPS
 _OF_DAMPERS = ("coefficient",)
 BASE_SPEED = "base_speed"  # of a slider
 _OF_SPRINGS = {"spring_stiffness": "stiffness"}  # and what it is called there
 _OF_MODES = ("modal_damping", "natural_frequency_hz")
-OF_ELEMENTS = (
-    *(*_OF_STOPS, *OF_AREAS, *OF_ROUND, *SOURCES, *OF_SLIDERS),
-    *(BASE_SPEED, *_OF_DAMPERS, *_OF_SPRINGS, *OF_SPRINGS),
-)
+OF_ELEMENTS = (*EXACT, BASE_SPEED, *_OF_DAMPERS, *_OF_SPRINGS)
 UNITS = {
     "frequency_hz": "Hz",
     SPIN: "Hz",
@@ -97,6 +95,12 @@ POSITIVE = (
     "natural_frequency_hz",
 )  # there is no system where they are zero
 NAMES = (FREQUENCY, *OF_ELEMENTS, *_OF_MODES, SPIN, SPEED)
+OF_TABLES = {"stops": OF_STOPS, "excitation": SOURCES, "dampers": _OF_DAMPERS}  # of scenes
+MEANT = {  # by words for what has another name
+    "preload": "'gap', which is negative for a preload",
+    "static_force": "'force', with the index of the ConstantForce",
+    "constant_force": "'force', with the index of the ConstantForce",
+}
 THE_FREQUENCY = Parameter(FREQUENCY)
 LAST_DIGIT = 1e-14  # relative: a value so near to the end of its range is that
 
@@ -126,16 +130,20 @@ class OwnParameter(Parameter):
 
     Examples
     --------
-    >>> from nldyn import Stop, System
+    >>> from nldyn import HarmonicForce, Stop, System, continue_branch, solve_orbit
     >>> from nldyn.system import OwnParameter
-    >>> system = System.from_matrices([[1.0]], [[4.0]], {"x": [1.0]}, stops=[Stop.linear("x", 8.0)])
+    >>> system = System.from_matrices([[1.0]], [[4.0]], {"x": [1.0]}, modal_damping=0.05,
+    ...     stops=[Stop.linear("x", 8.0)], excitation=[HarmonicForce("x", 1.0)])
     >>> ratio = OwnParameter(
     ...     name="stiffness ratio",
     ...     value=lambda system: system.stops[0].stiffness / 4.0,
-    ...     changed=lambda system, ratio: with_value(system, Parameter("stiffness"), 4.0 * ratio),
+    ...     changed=lambda system, value: system.with_elements(
+    ...         stops=[Stop.linear("x", 4.0 * value)]
+    ...     ),
     ... )
-    >>> ratio.value(system), value_of(with_value(system, ratio, 3.0), 1.0, ratio)
-    (2.0, 3.0)
+    >>> branch = continue_branch(solve_orbit(system, 0.2), (1.0, 3.0), parameter=ratio)
+    >>> branch.at(3.0)[0].system.stops[0].stiffness
+    12.0
     """
 
     value: Callable[[System], float]
@@ -153,7 +161,7 @@ class OwnParameter(Parameter):
 
 def has_exact_derivatives(parameter: Parameter) -> bool:
     """Whether the flow map differentiates by the parameter itself."""
-    return parameter.name in (*_OF_STOPS, *OF_AREAS, *SOURCES, *OF_SLIDERS, *OF_SPRINGS)
+    return parameter.name in EXACT
 
 
 def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
@@ -185,7 +193,7 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
         parameter = Parameter(parameter)
     if not isinstance(parameter, Parameter) or parameter.name not in NAMES:
         name = parameter.name if isinstance(parameter, Parameter) else parameter
-        raise SystemModelError(f"unknown parameter {shown(name)}; there are: {', '.join(NAMES)}")
+        raise SystemModelError(f"unknown parameter {shown(name)}; {_meant(name)}")
     if has_exact_derivatives(parameter):
         check_exact(system, parameter)
     elif parameter.name == BASE_SPEED:
@@ -210,6 +218,18 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     if parameter.name in (SPIN, SPEED):
         spin_of(system, parameter)
     return parameter
+
+
+def _meant(name: object) -> str:
+    """The parameter that is likely meant by a name that is none, or all that there are."""
+    name = name if isinstance(name, str) else ""
+    if name in MEANT:
+        return f"did you mean {MEANT[name]}?"
+    table, number, key = [*name.split("."), "", ""][:3]
+    if number.isdecimal() and key in OF_TABLES.get(table, ()):
+        return f"did you mean Parameter('{key}', {number})?"
+    guess = nearest(name, NAMES)
+    return f"did you mean '{guess}'?" if guess else f"there are: {', '.join(NAMES)}"
 
 
 def told_value(parameter: Parameter, *values: float, digits: int = 6) -> str:
@@ -366,7 +386,7 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
         return system
     if name in (SPIN, SPEED):
         return system.with_spin(value)
-    if name in _OF_STOPS:
+    if name in OF_STOPS:
         return system.with_elements(stops=_replaced(system.stops, index, name, value))
     if name in OF_AREAS:
         return system.with_area(index, OF_AREAS[name], value)

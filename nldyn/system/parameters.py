@@ -26,6 +26,7 @@ OF_AREAS = {  # and which number of their stops it is
     "area_friction": "friction",
 }
 SOURCES = ("amplitude", "mass_times_radius", "force")
+EXACT = (*OF_STOPS, *OF_AREAS, *OF_ROUND, *SOURCES, *OF_SLIDERS, *OF_SPRINGS)
 
 
 def strength_name(source: Excitation) -> str:
@@ -149,8 +150,7 @@ def check_exact(system: System, parameter: Parameter) -> None:
                 "tangential_stiffness"
             )
     else:
-        known = ", ".join([*OF_STOPS, *OF_AREAS, *OF_ROUND, *SOURCES, *OF_SPRINGS, *OF_SLIDERS])
-        raise SystemModelError(f"unknown parameter '{name}'; there are: {known}")
+        raise SystemModelError(f"unknown parameter '{name}'; there are: {', '.join(EXACT)}")
 
 
 def check_index(parameter: Parameter, kind: str, count: int) -> None:

@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 
 from nldyn.branches.tables import UNITS
+from nldyn.system.chart import NAMES
+from nldyn.system.chart import UNITS as UNITS_OF_PARAMETERS
+from nldyn.system.parameters import EXACT
 
 ROOT = Path(__file__).parents[2]
 BRANCHES = (ROOT / "docs" / "how-to" / "branches.md").read_text(encoding="utf-8")
@@ -153,6 +156,23 @@ def test_example_of_the_branches_prints_what_it_says(capsys, tmp_path, monkeypat
 def test_every_column_of_a_table_is_documented():
     rows = re.findall(r"^\| `(\w+)` \| (.*?) ?\|", BRANCHES, flags=re.M)
     assert dict(rows) == {"type": "", **{key: u.strip("1") for key, u in UNITS.items()}}
+
+
+def test_every_parameter_is_in_the_table_of_the_curves_with_its_unit_and_derivatives():
+    text = (ROOT / "docs" / "how-to" / "curves.md").read_text(encoding="utf-8")
+    table = text.split("## Parameters")[1].split("\n\n")[1]
+    said = {}
+    for row in table.splitlines()[2:]:
+        names, _, units, derivatives = (cell.strip() for cell in row.strip("|").split("|"))
+        listed, each = re.findall(r"`(\w+)`", names), units.split(", ")
+        if each == ["N/m^power"]:
+            each = [f"N/m^{name[1:]}" for name in listed]
+        for name, unit in zip(listed, each, strict=True):
+            said[name] = unit, derivatives
+    exact = {name: "exact" for name in (*EXACT, "frequency_hz")}
+    assert said == {
+        name: (UNITS_OF_PARAMETERS[name], exact.get(name, "differences")) for name in NAMES
+    }
 
 
 @pytest.mark.slow

@@ -1,5 +1,7 @@
 """Branches in parameters other than the frequency: the care is the same."""
 
+import re
+
 import numpy as np
 import pytest
 from bilinear import Bilinear, PiecewiseOrbit
@@ -210,10 +212,28 @@ def test_a_branch_ends_where_there_are_no_systems_beyond(name, limits):
     assert {reason.ending for reason in branch.stop_reasons} == {Ending.PARAMETER_RANGE_END}
 
 
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("stops.0.gap", "did you mean Parameter('gap', 0)?"),
+        ("excitation.1.amplitude", "did you mean Parameter('amplitude', 1)?"),
+        ("preload", "did you mean 'gap', which is negative"),
+        ("static_force", "did you mean 'force'"),
+        ("damping", "did you mean 'modal_damping'?"),
+        ("width", "there are: frequency_hz, gap"),
+    ],
+)
+def test_the_name_that_is_meant_is_told(name, meant):
+    with pytest.raises(SystemModelError, match=re.escape(f"unknown parameter '{name}'; {meant}")):
+        continue_branch(solve_orbit(beam(), HZ), (1.0, 2.0), parameter=name)
+
+
 def test_bad_parameters_are_named(whole):
     orbit = solve_orbit(beam(), HZ)
     with pytest.raises(SystemModelError, match="unknown parameter 'width'"):
         continue_branch(orbit, (1.0, 2.0), parameter="width")
+    with pytest.raises(SystemModelError, match=r"'clearance': stops.0. is no round clearance"):
+        continue_branch(orbit, (1.0, 2.0), parameter="clearance")
     with pytest.raises(SystemModelError, match="the orbit at gap = 2e-06 m lies outside"):
         continue_branch(orbit, (1e-5, 2e-5), parameter=Parameter("gap"))
     with pytest.raises(SystemModelError, match=f"was followed in {whole.parameter.name}"):
