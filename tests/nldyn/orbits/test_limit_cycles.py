@@ -156,7 +156,19 @@ def test_cycles_meet_in_a_fold_with_a_multiplier_of_one():
     _, fold, hopf = branch.special_points
     assert fold.kind == "LP"
     assert fold.orbit.multipliers[0] == pytest.approx(1.0, abs=1e-6)
-    assert fold.value <= branch.values[branch.values < 0.75][-5:].min()
+    assert fold.orbit.friction[0].stuck == 0.0
+    start = fold.orbit.states(np.zeros(1))[0]
+
+    def rate(_, y):  # and the trace
+        fall = math.exp(-(fold.value - y[1]) / 0.2)
+        pull = 0.3 + 0.2 * fall - 0.02 * y[1] - 0.2 * y[1] ** 3
+        return [y[1], pull - y[0], fall - 0.02 - 0.6 * y[1] ** 2]
+
+    end = solve_ivp(
+        rate, (0.0, fold.orbit.duration), [*start, 0.0], "DOP853", rtol=3e-14, atol=1e-15
+    ).y[:, -1]
+    assert end[:2] == pytest.approx(start, abs=1e-8)
+    assert math.exp(end[2]) == pytest.approx(1.0, abs=1e-6)  # Liouville's formula
     unstable, stable = (orbit for orbit in branch.at(0.72) if orbit.friction[0].stuck == 0.0)
     assert (unstable.stable, stable.stable) == (False, True)
     exact = 0.2 * math.log(0.2 / 0.2 / 0.02)
