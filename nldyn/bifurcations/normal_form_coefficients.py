@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import FAILURES, ComputationError, ConvergenceError
+from nldyn.flow.sliding import slides_one_way
 from nldyn.orbits.bordered import Place
 
 LARGEST_STEP = 0.1  # in ξ, of the differences
@@ -237,8 +238,14 @@ def loop_of(place: Place) -> Loop:
     closes, and which are closed at the nodes.
     """
     family = place.family
-    if family.problem.flow.system.sliders:
+    system = family.problem.flow.system
+    if system.sliders:
         raise CoefficientError("dry friction bends the motion wherever something turns or sticks")
+    if any(stop.friction for stop in system.round_stops.values()):
+        here = family.at(place.point)
+        flow, phases = here.problem.flow, here.problem.phases
+        if not slides_one_way(flow.trajectory(here.nodes, phases, here.omega)):
+            raise CoefficientError("what rubs in a round clearance turns or sticks on this motion")
     finer = replace(family, problem=replace(family.problem, flow=family.problem.flow.finer))
     nodes = place.point[:-1].reshape(family.segments, -1)
 

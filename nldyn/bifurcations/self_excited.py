@@ -110,19 +110,30 @@ def _corner(here: BranchNode, there: BranchNode) -> BranchNode | None:
 
 def slowest_slip(orbit: Orbit, which: int) -> float:
     """Smallest speed of a slider beside its largest one, on what it slides on."""
-    motion, system = orbit.trajectory, orbit.system
-    row = motion.flow.rate_rows[len(system.stops) + which]
-    belt = system.sliders[which].friction.base_speed
+    motion = orbit.trajectory
     phases = np.linspace(*motion.span, SAMPLES)
-    slips = np.abs(samples(motion) @ row - belt)
+    slips = _slips(orbit, which, samples(motion))
+    slips = np.where(np.isnan(slips), np.nanmax(slips), slips)
     place = int(np.argmin(slips))
     around = phases[max(place - 1, 0)], phases[min(place + 1, SAMPLES - 1)]
 
     def slip(phase: float) -> float:
-        return abs(float((motion.states(np.array([phase])) @ row)[0]) - belt)
+        now = float(_slips(orbit, which, motion.states(np.array([phase])))[0])
+        return float(slips.max()) if np.isnan(now) else now
 
     found = minimize_scalar(slip, bounds=around, method="bounded", options={"xatol": 1e-9})
     return float(found.fun) / float(slips.max())
+
+
+def _slips(orbit: Orbit, which: int, states: Real) -> Real:
+    """Speeds (k,) of sliding at states z (k, 2n); nan where a round clearance is open."""
+    flow, system = orbit.trajectory.flow, orbit.system
+    slider = system.rubbing[which]
+    if which < len(system.sliders):
+        row = flow.rate_rows[len(system.stops) + which]
+        return np.asarray(np.abs(states @ row - slider.friction.base_speed))
+    at = system.round_polar(system.round_stops[slider.stop], flow.to_modal(states))
+    return np.where(at.depth > 0.0, np.abs(at.sliding), np.nan)
 
 
 def _in_order(here: BranchNode, corner: BranchNode, there: BranchNode) -> list[BranchNode]:

@@ -282,7 +282,7 @@ class Stepper:
             made = self._over_node(here, PAST_NODE, NEAR_NODE) or self._past_crossing(here)
             return made and made._replace(step=made.there.arclength - here.arclength)
         if isinstance(here.condition, Turning):
-            way = past_corner(here) if here.orbit.system.sliders else []
+            way = past_corner(here) if here.orbit.system.rubbing else []
         else:
             way = corner_ahead(here, options.grazing_step, options.max_step)
         if not way:

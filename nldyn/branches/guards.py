@@ -224,7 +224,7 @@ def touches(attempt: Attempt) -> str:
 def changes_sticking(attempt: Attempt) -> str:
     """A self-excited motion begins or ceases to stick: its branch has a corner."""
     here = attempt.here
-    if not isinstance(here.condition, Turning) or not here.orbit.system.sliders:
+    if not isinstance(here.condition, Turning) or not here.orbit.system.rubbing:
         return ""
     changes = sticking(here.orbit) != sticking(attempt.found.orbit)
     return _told("a slider begins or ceases to stick", changes)

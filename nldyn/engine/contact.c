@@ -70,8 +70,10 @@ static void fill_rounding(const Motion *M)
         rounding[a] = is_held(fl, stop) ? pressing_noise(fl, stop, M->w)
                                         : output_noise(fl, stop, M->w);
     }
-    for (int o = panel->na; o < panel->outputs; o++)
-        rounding[o] = rate_noise(fl, panel->active[o - panel->na], M->w);
+    for (int o = panel->na; o < panel->outputs; o++) {
+        int stop = panel->active[o % panel->na];
+        rounding[o] = o < 2 * panel->na ? rate_noise(fl, stop, M->w) : pressing_noise(fl, stop, M->w);
+    }
     for (int o = 0; o < panel->outputs; o++) M->s->noise[o] = rounding[o];
 }
 
@@ -125,12 +127,12 @@ static int reach_aim(Motion *M, Trial *trial, bool event, bool fine)
     double off = watched_pace(fl, aim, M->closed, w, end_phase).value;
     int out = watched(fl, aim, M->closed, w, end_phase);
     bool there = fabs(off) <= gap_noise(fl, out, M->w);
-    if (is_slider(fl, aim)) {
+    if (rubs(fl, aim)) {
         dh = time_to_slip(M, aim, trial->kind, end_phase, h, &off);
         there = fabs(dh) <= RELEASED * h ||
                 (is_sprung(fl, aim) && fabs(dh) <= SUM_ROUNDING * end_phase / fl->omega) ||
                 (is_strained(fl, aim) && fabs(off) <= strain_noise(fl, aim, w)) ||
-                (fl->slides[aim] != 0 && fabs(off) <= drag_noise(fl, aim, w, end_phase));
+                (fl->slides[aim] != 0 && fabs(off) <= slip_noise(fl, aim, w, end_phase));
     } else if (ends_smoothly(fl, aim, M->closed)) {
         dh = time_to_release(M->tab, aim, trial->kind, h, M->panel);
         there = fabs(dh) <= RELEASED * h;
@@ -144,7 +146,7 @@ static int reach_aim(Motion *M, Trial *trial, bool event, bool fine)
     } else if (!event && dh == INFINITY && !M->closed[aim] && h < MISSED * trial->tried) {
         change_length(M, trial, trial->kind, FARTHER); /* it is farther off than it was seen */
         return AGAIN;
-    } else if (!event && dh > h && is_slider(fl, aim) && h < trial->h_max) {
+    } else if (!event && dh > h && rubs(fl, aim) && h < trial->h_max) {
         change_length(M, trial, trial->kind, smaller(FARTHER, trial->h_max / h));
         return AGAIN; /* it came sooner in the motion before */
     } else if (dh > 0.0 && fine) { /* the contact goes on */

@@ -21,8 +21,7 @@
 /* outcomes; the names and numbers of layout.py */
 enum Status {
     OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL, ROUNDED,
-    TOO_MANY_STEPS, OTHER_CONTACTS, INTERRUPTED, OUT_OF_MEMORY, SLIDING_TURNS,
-    UNDECIDED
+    TOO_MANY_STEPS, OTHER_CONTACTS, INTERRUPTED, OUT_OF_MEMORY, UNDECIDED
 };
 
 #define FLIGHT (-1) /* kind of a piece that is no contact panel */
@@ -90,8 +89,8 @@ typedef struct {
     double lead;        /* of that: row of the first one, or -1 */
     double centre;      /* of both: displacement along them of the centre */
     double sense;       /* 1 for a ring, in which the body is, -1 for a pin, around which it is */
-    double rub;         /* coefficient of friction in the sense of sliding, from first to second */
-    double surface;     /* speed in that sense of the surface on that of the other side */
+    double rub;         /* coefficient of friction, in both of its rows as the next */
+    double surface;     /* speed of the surface on that of the other side, from first to second */
     double area;        /* number of the area of contact that it is a point of, or -1 */
     double share;       /* what of that it stands for: change of its stiffness with the area's */
     double tangential;  /* of a slider behind a spring: its stiffness */
@@ -194,8 +193,9 @@ typedef struct {
 
 /* Arrays of a contact panel with na stops, m nodes and n modes, filled by `solve_panel`; what
  * depends on kind and length alone serves the next panel of the same stops too. Outputs are the
- * na penetrations and, if a force depends on them, their na rates. That of a rigid stop, and of a
- * slider that sticks, is the acceleration that it would have without its own force; the force is in
+ * na penetrations and, if a force depends on them, their na rates, and na accelerations: those that
+ * round clearances would have without their own forces. That of a rigid stop, and of a slider that
+ * sticks, is the acceleration that it would have without its own force; the force is in
  * proportion to it. */
 typedef struct {
     int na, m, outputs;
@@ -241,6 +241,7 @@ typedef struct {
     double *forces, *part, *change;                    /* panel_columns */
     double *pushed, *carried, *added, *driven_many, *flown, *pushing, *showing; /* many stops */
     double *stop_forces, *pushes, *first_pushes, *held, *mobility; /* rigid stops */
+    double *across; /* (n_stops,) see `fill_across` */
     double *drags; /* (n_stops,) speeds of the places of sliders behind springs, see `drag_speed` */
     int *resting, *mobility_order;
     double *rate, *moved, *moved_shift, *along, *along_columns, *offsets;

@@ -79,7 +79,26 @@ static double coarsest_instant(const Flow *fl)
 /* speed of a slider along what it slides on, in the sense in which it slides */
 static double slip(const Flow *fl, int s, const double *w, double phase)
 {
-    return fl->slides[s] * drag_speed(fl, s, fl->slides[s], w, phase);
+    double speed = is_second(fl, s) ? round_slip(fl, s, w, phase).value
+                                    : drag_speed(fl, s, fl->slides[s], w, phase);
+    return fl->slides[s] * speed;
+}
+
+/* rounding error of it */
+static double slip_noise(const Flow *fl, int s, const double *w, double phase)
+{
+    return is_second(fl, s) ? round_slip_noise(fl, s, w, phase) : drag_noise(fl, s, w, phase);
+}
+
+/* that of the force that holds a slider */
+static double hold_noise(const Flow *fl, int s, const double *w)
+{
+    if (is_strained(fl, s)) return strain_noise(fl, s, w);
+    double noise = pressing_noise(fl, s, w), mobility = stop_of(fl, s)->mobility;
+    if (!is_second(fl, s)) return noise / mobility;
+    int lead = (int)stop_of(fl, s)->lead;
+    noise += pressing_noise(fl, lead, w);
+    return noise / smaller(mobility, stop_of(fl, lead)->mobility);
 }
 
 /* fill values (m,) at the nodes of a panel, positive as long as a slider at a place among the
@@ -87,6 +106,10 @@ static double slip(const Flow *fl, int s, const double *w, double phase)
 static void show_slider(const Flow *fl, const Panel *panel, int position, int side, double *values)
 {
     int m = panel->m, s = panel->active[position];
+    if (is_second(fl, s)) {
+        show_rubbing(fl, panel, s, side, values);
+        return;
+    }
     for (int i = 0; i < m; i++)
         if (fl->slides[s] != 0)
             values[i] = fl->slides[s] * (panel->output[(panel->na + position) * m + i] -
@@ -94,6 +117,22 @@ static void show_slider(const Flow *fl, const Panel *panel, int position, int si
         else
             values[i] = grip(fl, s) * normal_at(fl, panel, s, i) -
                         side * panel->F[position * m + i];
+}
+
+/* side to which a slider is held at the end of a panel */
+static int held_to(const Motion *M, int s, double end_phase)
+{
+    const Panel *panel = M->panel;
+    int m = panel->m;
+    double force = at_end(M->tab, panel->F + (size_t)place_of(panel, s) * m);
+    if (is_second(M->fl, s)) {
+        double place[2], speed[2], pace[2];
+        int lead = (int)stop_of(M->fl, s)->lead;
+        double other = at_end(M->tab, panel->F + (size_t)place_of(panel, lead) * m);
+        round_now(M->fl, lead, M->w_end, end_phase, place, speed, pace);
+        force = place[0] * force - place[1] * other;
+    }
+    return force < 0.0 ? -1 : 1;
 }
 
 /* time from the end of a panel to where a slider sticks or slips, or inf, and the value that it
@@ -105,7 +144,7 @@ static double time_to_slip(const Motion *M, int s, int kind, double end_phase, d
     const Panel *panel = M->panel;
     double *nodes = M->s->inner;
     int position = place_of(panel, s);
-    int side = at_end(M->tab, panel->F + (size_t)position * panel->m) < 0.0 ? -1 : 1;
+    int side = held_to(M, s, end_phase);
     show_slider(fl, panel, position, side, nodes);
     *value = fl->slides[s] != 0 ? slip(fl, s, M->w_end, end_phase) : at_end(M->tab, nodes);
     double slope = slope_at_end(M->tab, nodes) / (h * (kind == 0 ? 1.0 : M->tab->power));
@@ -120,9 +159,11 @@ static bool at_switch(const Flow *fl, int stop, const double *w, double phase, d
     Course at = watched_pace(fl, stop, closed, w, phase);
     int out = watched(fl, stop, closed, w, phase);
     if (is_strained(fl, stop)) return at_grip(fl, stop, w, phase, allowed);
-    if (is_slider(fl, stop)) /* where it sticks, the state does not tell */
+    if (rubs(fl, stop)) { /* where it sticks, the state does not tell */
+        double pace = is_second(fl, stop) ? round_slip(fl, stop, w, phase).first : at.second;
         return fabs(slip(fl, stop, w, phase)) <=
-               allowed * fabs(at.second) + 10.0 * drag_noise(fl, stop, w, phase);
+               allowed * fabs(pace) + 10.0 * slip_noise(fl, stop, w, phase);
+    }
     double instant = allowed + 10.0 * SUM_ROUNDING * phase / fl->omega;
     return fabs(at.value) <= instant * fabs(at.first) + 10.0 * gap_noise(fl, out, w);
 }
@@ -140,7 +181,7 @@ static bool with_event(const Flow *fl, int stop, const double *w, double phase, 
 /* whether a stop's next event is no switch of a force: a body rests on a rigid one, or slides */
 static bool ends_smoothly(const Flow *fl, int stop, const bool *closed)
 {
-    return closed[stop] && (is_rigid(fl, stop) || is_slider(fl, stop));
+    return closed[stop] && (is_rigid(fl, stop) || rubs(fl, stop));
 }
 
 /* error allowed in the instant at which a stop and others with it open or close */
@@ -317,12 +358,11 @@ static Shown show_friction(const Motion *M, double phase, double h, int s, int p
     for (int i = 0; i < m; i++) values[i + 1] = inner[i];
     values[0] = at_start(tab, inner);
     values[m + 1] = at_end(tab, inner);
-    Shown shown = {pressing_noise(fl, s, M->w) / stop_of(fl, s)->mobility, 0.0, 0.0};
-    if (is_strained(fl, s)) shown.noise = strain_noise(fl, s, M->w);
+    Shown shown = {hold_noise(fl, s, M->w), 0.0, 0.0};
     if (fl->slides[s] != 0) {
         values[0] = slip(fl, s, M->w, phase);
         values[m + 1] = slip(fl, s, M->w_end, phase + fl->omega * h);
-        shown = (Shown){drag_noise(fl, s, M->w, phase), 0.0, values[1] - values[0]};
+        shown = (Shown){slip_noise(fl, s, M->w, phase), 0.0, values[1] - values[0]};
     }
     refine(tab, values, scratch->fine);
     shown.tail = 4.0 * legendre_tail(tab, inner);
@@ -387,10 +427,10 @@ static Event first_event(const Motion *M, int kind, double phase, double h)
     if (M->panel->na < fl->n_stops) drive_back(fl, M->tab, M->w, M->panel, M->s);
     for (int stop = 0; stop < fl->n_stops; stop++) {
         if (M->closed[stop]) position++; /* a bond is always closed */
-        if (is_bond(fl, stop) || is_second(fl, stop)) continue;
-        if (is_slider(fl, stop) && (!M->closed[stop] || slides_freely(fl, stop))) continue;
+        if (is_bond(fl, stop) || (is_second(fl, stop) && !rubs_around(fl, stop))) continue;
+        if (rubs(fl, stop) && (!M->closed[stop] || slides_freely(fl, stop))) continue;
         if (is_rigid(fl, stop) && !M->closed[stop] && held_open(M, stop)) continue;
-        if (!is_slider(fl, stop)) {
+        if (!rubs(fl, stop)) {
             int out = watched(fl, stop, M->closed, M->w, phase);
             Shown shown = show_stop(M, kind, phase, h, stop, out, position);
             find_event(M, kind, phase, h, stop, shown, &found);

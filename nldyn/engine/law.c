@@ -43,18 +43,33 @@ static bool is_held(const Flow *fl, int s)
     return is_rigid(fl, s) || (is_slider(fl, s) && fl->slides[s] == 0 && !is_sprung(fl, s));
 }
 
-/* whether a slider is held by friction at present */
-static bool is_stuck(const Motion *M, int s)
-{
-    return M->closed[s] && is_slider(M->fl, s) && is_held(M->fl, s);
-}
-
 /* whether a row is the first direction of a round clearance, or the second */
 static bool is_round(const Flow *fl, int s) { return stop_of(fl, s)->second >= 0.0; }
 
 static bool is_second(const Flow *fl, int s) { return stop_of(fl, s)->lead >= 0.0; }
 
 static bool is_planar(const Flow *fl, int s) { return is_round(fl, s) || is_second(fl, s); }
+
+/* whether a row is the second direction of a round clearance with friction, and whether its surface
+ * sticks there */
+static bool rubs_around(const Flow *fl, int s) { return is_second(fl, s) && stop_of(fl, s)->rub > 0.0; }
+
+static bool sticks_around(const Flow *fl, int s) { return rubs_around(fl, s) && fl->slides[s] == 0; }
+
+/* the same of either direction */
+static bool holds_around(const Flow *fl, int s)
+{
+    return sticks_around(fl, is_round(fl, s) ? (int)stop_of(fl, s)->second : s);
+}
+
+/* whether a row has friction that is pressed on: a slider or a round clearance */
+static bool rubs(const Flow *fl, int s) { return is_slider(fl, s) || rubs_around(fl, s); }
+
+/* whether what slides is held by friction at present */
+static bool is_stuck(const Motion *M, int s)
+{
+    return M->closed[s] && (sticks_around(M->fl, s) || (is_slider(M->fl, s) && is_held(M->fl, s)));
+}
 
 static bool is_elastic(const Flow *fl, int s)
 {
@@ -78,9 +93,10 @@ static Value friction_at(const Flow *fl, int s, double speed)
     return (Value){way * (slider->friction + more), -more / slider->fading};
 }
 
-/* most friction per unit of the normal force at rest */
+/* most friction per unit of the normal force at rest, of a slider or a second direction */
 static double grip(const Flow *fl, int s)
 {
+    if (is_second(fl, s)) return stop_of(fl, s)->rub;
     return stop_of(fl, s)->friction + stop_of(fl, s)->adhesion;
 }
 
@@ -236,7 +252,7 @@ static bool needs_speed(const Flow *fl, int s)
     needed = needed || stop_of(fl, s)->rub != 0.0;             /* or turns */
     for (int c = 0; c < fl->n_parameters; c++) {
         int64_t column = fl->parameters[2 * c];
-        bool viscous = column == DISSIPATION || column == DASHPOT;
+        bool viscous = column == DISSIPATION || column == DASHPOT || column == RUB;
         needed = needed || (viscous && is_number_of(fl, c, s));
     }
     return needed;

@@ -20,9 +20,8 @@ _RECORD = struct.Struct("3q")
 
 (
     OK, TOO_MANY_PIECES, CONTACT_FAILED, DIVERGED, SINGULAR, NOT_CONVERGED, RECORD_FULL, ROUNDED,
-    TOO_MANY_STEPS, OTHER_CONTACTS, INTERRUPTED, OUT_OF_MEMORY, SLIDING_TURNS,
-    UNDECIDED,
-) = range(14)  # fmt: skip
+    TOO_MANY_STEPS, OTHER_CONTACTS, INTERRUPTED, OUT_OF_MEMORY, UNDECIDED,
+) = range(13)  # fmt: skip
 ROUND = 1.5  # below this exponent a slope sets in almost at once: nodes at the switch count
 
 
@@ -52,8 +51,8 @@ class StopRow(NamedTuple):
     lead: float = -1.0  # of that: row of the first one, or -1
     centre: float = 0.0  # of both: displacement along them of the centre
     sense: float = 1.0  # 1 for a ring, in which the body is, -1 for a pin, around which it is
-    rub: float = 0.0  # coefficient of friction in the sense of sliding, from first to second
-    surface: float = 0.0  # speed in that sense of the surface on that of the other side
+    rub: float = 0.0  # coefficient of friction, in both of its rows as the next
+    surface: float = 0.0  # speed of the surface on that of the other side, from first to second
     area: float = -1.0  # number of the area of contact that it is a point of, or -1
     share: float = 1.0  # what of that it stands for: change of its stiffness with the area's
     tangential: float = 0.0  # of a slider behind a spring: its stiffness

@@ -29,7 +29,8 @@ static void renew_panel(const Flow *fl, Panel *panel, const int *active, int na)
     for (int a = 0; a < na; a++) {
         panel->active[a] = active[a];
         panel->round = panel->round || is_round(fl, active[a]);
-        if (needs_speed(fl, active[a])) panel->outputs = 2 * na;
+        if (panel->outputs == na && needs_speed(fl, active[a])) panel->outputs = 2 * na;
+        if (sticks_around(fl, active[a])) panel->outputs = 3 * na;
     }
     for (int i = 0; i < panel->outputs * panel->m; i++) panel->output[i] = 0.0;
     for (int a = 0; a < na; a++) panel->decayed[a] = panel->decay[a] = 0.0;
@@ -51,6 +52,15 @@ static bool same_stops(const Panel *panel, const int *active, int na)
 static int output_order(const Flow *fl, int stop, int rate)
 {
     return rate == 0 && is_held(fl, stop) ? 2 : rate;
+}
+
+/* whether forces act on an output at once: it is an acceleration, but what holds it does not count */
+static bool acts_at_once(const Flow *fl, const Panel *panel, int o, int a)
+{
+    int stop = panel->active[o % panel->na], other = panel->active[a];
+    if (o < panel->na) return is_held(fl, stop) && stop != other;
+    if (o < 2 * panel->na || !is_planar(fl, stop)) return false;
+    return other != stop && other != partner_row(fl, stop);
 }
 
 /* whether a slider moves as another stop does */
@@ -101,8 +111,8 @@ static void fill_influences(const Flow *fl, const Gauss *tab, int kind, double h
             for (int j = 0; j < m; j++)
                 for (int i = 0; i < m; i++)
                     G[(size_t)j * height + i] = -h * integrate[j * m + i] * product[j * m + i];
-            if (o < na && a != o && is_held(fl, panel->active[o])) { /* what acts at once */
-                double kick = between(fl, panel->active[o], panel->active[a]);
+            if (acts_at_once(fl, panel, o, a)) {
+                double kick = between(fl, panel->active[o % na], panel->active[a]);
                 for (int i = 0; i < m; i++) G[(size_t)i * height + i] -= kick;
             }
         }
@@ -244,6 +254,7 @@ static void panel_forces(const Flow *fl, Panel *panel, double *slope)
         double *viscosity = rates ? slope + (size_t)(na + a) * m : NULL;
         if (is_round(fl, panel->active[a])) round_forces(fl, panel, a, slope);
         if (panel->round && partner_of(fl, panel, a) >= 0) continue;
+        for (int i = 0; i < m && panel->outputs > 2 * na; i++) slope[(2 * na + a) * m + i] = 0.0;
         closed_laws(fl, panel->active[a], m, delta, speed, panel->F + (size_t)a * m,
                     slope + (size_t)a * m, viscosity);
     }
@@ -263,7 +274,7 @@ static void panel_forces(const Flow *fl, Panel *panel, double *slope)
 static void invert_panel(const Flow *fl, Panel *panel)
 {
     int width = panel->na * panel->m, height = panel->outputs * panel->m, pad = padded(width);
-    const double *slope = panel->slope, *rates = slope + width;
+    const double *slope = panel->slope;
     bool same = height == width && !panel->round;
     for (int p = 0; p < height && same; p++) same = slope[p] == panel->inverted[p];
     if (same) return;
@@ -272,8 +283,8 @@ static void invert_panel(const Flow *fl, Panel *panel)
         double *restrict column = panel->inverse + (size_t)q * pad;
         const double *G = panel->G + (size_t)q * height;
         for (int p = 0; p < width; p++) column[p] = -slope[p] * G[p];
-        if (height > width)
-            for (int p = 0; p < width; p++) column[p] -= rates[p] * G[width + p];
+        for (int more = width; more < height; more += width)
+            for (int p = 0; p < width; p++) column[p] -= slope[more + p] * G[more + p];
         for (int p = width; p < pad; p++) column[p] = 0.0;
     }
     for (int o = 0; o < panel->outputs; o++)
@@ -397,7 +408,8 @@ static double renew_outputs(const Flow *fl, Panel *panel, const Scratch *s, cons
         }
         if (!isfinite(total)) return NAN; /* a maximum may pass over nan */
         if (panel->round && o < panel->na) scale = deepest_of(fl, panel, o);
-        if (o < panel->na && longest > noise[o]) change = larger(change, longest / scale);
+        bool counts = o < panel->na || o >= 2 * panel->na;
+        if (counts && longest > noise[o]) change = larger(change, longest / scale);
     }
     return change;
 }

@@ -188,7 +188,7 @@ static bool output_resolved(const Flow *fl, const Gauss *tab, int kind, double h
         return false;
     double goal = panel->decay[a] <= DECAY ? fl->tail : DAMPED_TAIL * fl->tail; /* hold_speeds */
     if (1.0 < stop->exponent && stop->exponent < ROUND) goal *= SHARP_TAIL;
-    if (is_held(fl, closed)) goal *= REST_TAIL;
+    if (is_held(fl, closed) || holds_around(fl, closed)) goal *= REST_TAIL;
     double floor = BLIND * noise[a] / deepest;
     double tail = larger(goal * fl->tail / s->forced[a], floor);
     double shake = 0.0; /* of the force by rounding: terms of a bond cancel where it is at rest */
@@ -236,7 +236,7 @@ static bool shows_decay(const Flow *fl, const Gauss *tab, int kind, double h, Pa
 {
     int na = panel->na, m = panel->m;
     bool shown = true;
-    for (int o = na; o < panel->outputs; o++) {
+    for (int o = na; o < panel->outputs && o < 2 * na; o++) {
         int a = o - na;
         double total = 0.0, mobility = stop_of(fl, panel->active[a])->mobility;
         for (int i = 0; i < m; i++)

@@ -24,7 +24,7 @@ static int held_stops(const Motion *M, bool with_sliders)
     const Flow *fl = M->fl;
     int n = 0;
     for (int s = 0; s < fl->n_stops; s++)
-        if (M->closed[s] && is_held(fl, s) && (with_sliders || is_rigid(fl, s)))
+        if (M->closed[s] && (is_rigid(fl, s) || (with_sliders && is_stuck(M, s))))
             M->s->resting[n++] = s;
     return n;
 }
@@ -50,12 +50,96 @@ static double rubbing_share(const Flow *fl, int slider)
     return slider < 0 ? 0.0 : fl->slides[slider] * stop_of(fl, slider)->friction;
 }
 
-/* speed that a unit impulse at a stop, with that of what slides on it, takes from another */
-static double taken_by(const Motion *M, int stop, int other)
+/* rows that a force acts on together, and its shares in them */
+typedef struct {
+    int count, row[2];
+    double share[2];
+} RowsAlong;
+
+/* those of what is held: of a surface in a round clearance both directions, see `fill_across` */
+static RowsAlong held_along(const Motion *M, int s)
 {
-    int slider = sliding_with(M, other);
-    double taken = between(M->fl, stop, other);
-    if (slider >= 0) taken += rubbing_share(M->fl, slider) * between(M->fl, stop, slider);
+    if (!is_second(M->fl, s)) return (RowsAlong){1, {s}, {1.0}};
+    int lead = (int)stop_of(M->fl, s)->lead;
+    return (RowsAlong){2, {lead, s}, {M->s->across[lead], M->s->across[s]}};
+}
+
+/* the same of what holds it, with what slides on it */
+static RowsAlong holding_along(const Motion *M, int s)
+{
+    int slider = sliding_with(M, s);
+    return slider < 0 ? held_along(M, s)
+                      : (RowsAlong){2, {s, slider}, {1.0, rubbing_share(M->fl, slider)}};
+}
+
+/* fill s->across (n_stops,): directions along the circles of closed round clearances */
+static void fill_across(const Motion *M, double phase)
+{
+    const Flow *fl = M->fl;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!rubs_around(fl, s) || !M->closed[s]) continue;
+        double place[2], speed[2], pace[2];
+        int lead = (int)stop_of(fl, s)->lead;
+        round_now(fl, lead, M->w, phase, place, speed, pace);
+        Polar at = polar(fl, lead, place, speed);
+        M->s->across[lead] = -at.n[1];
+        M->s->across[s] = at.n[0];
+    }
+}
+
+/* sum over rows of their share in numbers (n_stops,) */
+static double sum_along(RowsAlong along, const double *values)
+{
+    double total = 0.0;
+    for (int d = 0; d < along.count; d++) total += along.share[d] * values[along.row[d]];
+    return total;
+}
+
+/* acceleration of what is held, by those of the rows */
+static double held_pace(const Motion *M, int s, const double *rates, double phase)
+{
+    double pace = sum_along(held_along(M, s), rates);
+    if (!is_second(M->fl, s)) return pace;
+    double place[2], speed[2], flight[2];
+    int lead = (int)stop_of(M->fl, s)->lead;
+    round_now(M->fl, lead, M->w, phase, place, speed, flight);
+    Polar at = polar(M->fl, lead, place, speed);
+    return pace - at.across * (at.n[0] * speed[0] + at.n[1] * speed[1]) / at.radius;
+}
+
+/* force that holds a slider, by s->stop_forces */
+static double held_force(const Motion *M, int s)
+{
+    return sum_along(held_along(M, s), M->s->stop_forces);
+}
+
+/* what presses it on */
+static double held_on(const Motion *M, int s)
+{
+    const Flow *fl = M->fl;
+    const double *forces = M->s->stop_forces;
+    if (is_pressed(fl, s)) return forces[(int)stop_of(fl, s)->normal];
+    if (!is_second(fl, s)) return stop_of(fl, s)->pressing;
+    int lead = (int)stop_of(fl, s)->lead;
+    double out = M->s->across[s] * forces[lead] - M->s->across[lead] * forces[s];
+    return stop_of(fl, s)->sense * out;
+}
+
+/* speed that a unit impulse at what is held, with that of what slides on it, takes from a row */
+static double taken_by(const Motion *M, int row, int other)
+{
+    RowsAlong by = holding_along(M, other);
+    double taken = 0.0;
+    for (int d = 0; d < by.count; d++) taken += by.share[d] * between(M->fl, row, by.row[d]);
+    return taken;
+}
+
+/* and from what is held */
+static double held_by(const Motion *M, int stop, int other)
+{
+    RowsAlong of = held_along(M, stop);
+    double taken = 0.0;
+    for (int d = 0; d < of.count; d++) taken += of.share[d] * taken_by(M, of.row[d], other);
     return taken;
 }
 
@@ -65,7 +149,7 @@ static void factor_mobilities(const Motion *M, int n)
     Scratch *s = M->s;
     for (int a = 0; a < n; a++)
         for (int b = 0; b < n; b++)
-            s->mobility[b * n + a] = taken_by(M, s->resting[a], s->resting[b]);
+            s->mobility[b * n + a] = held_by(M, s->resting[a], s->resting[b]);
     lu_factor(s->mobility, n, s->mobility_order);
 }
 
@@ -87,16 +171,18 @@ static void contact_forces(const Motion *M, double phase)
         if (forces[b] != 0.0)
             for (int s = 0; s < n; s++) rates[s] -= between(fl, s, b) * forces[b];
     fill_drags(M, phase);
+    fill_across(M, phase);
     int count = held_stops(M, true);
     if (count == 0) return;
     const int *stops = M->s->resting;
     factor_mobilities(M, count);
-    for (int a = 0; a < count; a++) holding[a] = rates[stops[a]];
+    for (int a = 0; a < count; a++) holding[a] = held_pace(M, stops[a], rates, phase);
     lu_apply_vector(M->s->mobility, count, M->s->mobility_order, holding);
     for (int a = 0; a < count; a++) {
-        int slider = sliding_with(M, stops[a]);
-        forces[stops[a]] = holding[a];
-        if (slider >= 0) forces[slider] = rubbing_share(fl, slider) * holding[a];
+        RowsAlong by = holding_along(M, stops[a]);
+        for (int d = 0; d < by.count; d++) /* round clearances press, too */
+            forces[by.row[d]] = by.share[d] * holding[a] +
+                                (is_planar(fl, by.row[d]) ? forces[by.row[d]] : 0.0);
         for (int s = 0; s < n; s++) rates[s] -= taken_by(M, s, stops[a]) * holding[a];
     }
 }
@@ -245,6 +331,32 @@ static void strike(Motion *M, int stop, double speed, Value restitution, double 
     push_state(M, slider, hit.tangent, s->moved);
 }
 
+/* the same of the speed of what is held */
+static void held_columns(const Motion *M, int s, double phase, double t, const double *shift,
+                         double *found)
+{
+    const Flow *fl = M->fl;
+    if (!is_second(fl, s)) {
+        shifted_columns(M, s, 1, phase, t, shift, found);
+        return;
+    }
+    double place[2], speed[2], pace[2], *moved = M->s->closing;
+    RowsAlong along = held_along(M, s);
+    int lead = along.row[0];
+    round_now(fl, lead, M->w, phase, place, speed, pace);
+    Polar at = polar(fl, lead, place, speed);
+    double turning = (at.n[0] * speed[0] + at.n[1] * speed[1]) / at.radius;
+    for (int c = 0; c < M->n_columns; c++) found[c] = 0.0;
+    for (int d = 0; d < 2; d++)
+        for (int order = 0; order < 2; order++) {
+            shifted_columns(M, along.row[d], order, phase, t, shift, moved);
+            for (int c = 0; c < fl->n_parameters && order == 0; c++)
+                if (is_parameter(fl, c, CENTRE, along.row[d])) moved[fl->size + c] -= 1.0;
+            double share = along.share[d] * (order == 1 ? 1.0 : -turning);
+            for (int c = 0; c < M->n_columns; c++) found[c] += share * moved[c];
+        }
+}
+
 /* fill s->offsets (count, 1 + n): gaps (rate 0) of the `resting` stops or the rates, and their
  * sensitivities */
 static void fill_offsets(const Motion *M, double phase, double t, const double *shift, int count,
@@ -256,8 +368,12 @@ static void fill_offsets(const Motion *M, double phase, double t, const double *
         double *off = M->s->offsets + (size_t)a * (1 + n);
         Course at = output_now(fl, stop, M->w, phase);
         off[0] = rate == 1 ? at.first - stop_of(fl, stop)->belt : at.value - stop_of(fl, stop)->gap;
+        if (is_second(fl, stop)) off[0] = round_slip(fl, stop, M->w, phase).value;
         if (n == 0) continue;
-        shifted_columns(M, stop, rate, phase, t, shift, off + 1);
+        if (rate == 1)
+            held_columns(M, stop, phase, t, shift, off + 1);
+        else
+            shifted_columns(M, stop, 0, phase, t, shift, off + 1);
         for (int c = 0; c < fl->n_parameters; c++)
             if (rate == 0 && is_parameter(fl, c, GAP, stop)) off[1 + fl->size + c] -= 1.0;
     }
@@ -267,10 +383,10 @@ static void fill_offsets(const Motion *M, double phase, double t, const double *
 static void fill_pull(const Motion *M, int stop, double *pull)
 {
     const Flow *fl = M->fl;
-    int slider = sliding_with(M, stop);
+    RowsAlong by = holding_along(M, stop);
     for (int k = 0; k < fl->size; k++) {
-        pull[k] = push_of(fl, stop)[k];
-        if (slider >= 0) pull[k] += rubbing_share(fl, slider) * push_of(fl, slider)[k];
+        pull[k] = 0.0;
+        for (int d = 0; d < by.count; d++) pull[k] += by.share[d] * push_of(fl, by.row[d])[k];
     }
 }
 
@@ -282,6 +398,7 @@ static void hold(Motion *M, double phase, double t, const double *shift)
     const Flow *fl = M->fl;
     Scratch *s = M->s;
     int n = M->with_columns ? M->n_columns : 0, factored = 0; /* rates: the same stops, or more */
+    fill_across(M, phase);
     for (int rate = 0; rate < 2; rate++) {
         int count = held_stops(M, rate == 1);
         if (count == 0) continue;
@@ -307,8 +424,12 @@ static void loosen_slider(const Motion *M, int s, double phase, double roundings
 {
     const Flow *fl = M->fl;
     double speed = output_now(fl, s, M->w, phase).first - stop_of(fl, s)->belt;
-    double most = roundings * (rate_noise(fl, s, M->w) + SUM_ROUNDING * fabs(stop_of(fl, s)->belt));
-    if (fabs(speed) <= most) return;
+    double noise = rate_noise(fl, s, M->w) + SUM_ROUNDING * fabs(stop_of(fl, s)->belt);
+    if (is_second(fl, s)) {
+        speed = round_slip(fl, s, M->w, phase).value;
+        noise = round_slip_noise(fl, s, M->w, phase);
+    }
+    if (fabs(speed) <= roundings * noise) return;
     fl->slides[s] = speed > 0.0 ? 1 : -1;
     M->panel->na = -1; /* its equations are others now */
 }
@@ -359,19 +480,16 @@ static void slip_of(const Motion *M, double phase, bool all)
         int loosest = -1;
         if (!any_sticks(M)) return;
         contact_forces(M, phase);
-        const double *forces = M->s->stop_forces;
         for (int s = 0; s < fl->n_stops; s++) {
             if (!is_stuck(M, s)) continue;
             if (!all && !(is_pressed(fl, s) && is_rigid(fl, (int)stop_of(fl, s)->normal))) continue;
-            double normal = is_pressed(fl, s) ? forces[(int)stop_of(fl, s)->normal]
-                                              : stop_of(fl, s)->pressing;
-            double load = fabs(forces[s]) / (grip(fl, s) * larger(normal, 0.0));
+            double load = fabs(held_force(M, s)) / (grip(fl, s) * larger(held_on(M, s), 0.0));
             if (!(load > most)) continue;
             most = load;
             loosest = s;
         }
         if (loosest < 0) return;
-        fl->slides[loosest] = forces[loosest] > 0.0 ? 1 : -1;
+        fl->slides[loosest] = held_force(M, loosest) > 0.0 ? 1 : -1;
         M->panel->na = -1;
     }
 }
@@ -402,15 +520,15 @@ static void slide_or_stick(Motion *M, int s, double phase, double t)
         return;
     }
     if (fl->slides[s] == 0) {
-        fl->slides[s] = M->s->stop_forces[s] > 0.0 ? 1 : -1;
+        fl->slides[s] = held_force(M, s) > 0.0 ? 1 : -1;
         return;
     }
-    double pace = M->s->pushes[s]; /* its acceleration */
+    double pace = held_pace(M, s, M->s->pushes, phase);
     for (int c = 0; c < M->n_columns; c++) shift[c] = 0.0;
     if (M->with_columns) {
         state_rate(M);
-        output_columns(fl, s, 1, phase, t, M->columns, M->n_columns, shift);
-        for (int c = 0; c < M->n_columns; c++) shift[c] /= -pace;
+        held_columns(M, s, phase, t, shift, M->s->moved);
+        for (int c = 0; c < M->n_columns; c++) shift[c] = -M->s->moved[c] / pace;
         move(M, 1.0, shift);
     }
     fl->slides[s] = 0;
@@ -468,7 +586,7 @@ static void find_undecided(Motion *M)
     int n = slid_on >= 0 ? held_stops(M, true) : 0;
     double *matrix = s->mobility;
     for (int a = 0; a < n; a++)
-        for (int b = 0; b < n; b++) matrix[a * n + b] = taken_by(M, s->resting[a], s->resting[b]);
+        for (int b = 0; b < n; b++) matrix[a * n + b] = held_by(M, s->resting[a], s->resting[b]);
     for (int p = 0; p < n; p++) {
         if (!(matrix[p * n + p] > 0.0)) {
             M->undecided = is_rigid(M->fl, s->resting[p]) ? s->resting[p] : slid_on;
@@ -589,7 +707,7 @@ static void impact(Motion *M, int first, bool crossed, double phase, double t)
         M->closings[hit]++;
     }
     for (int s = 0; s < fl->n_stops; s++) /* an impact may turn any of them */
-        if (is_slider(fl, s) && !is_sprung(fl, s)) fl->slides[s] = 0;
+        if (rubs(fl, s) && !is_sprung(fl, s)) fl->slides[s] = 0;
     M->panel->na = -1;
     loosen_sliders(M, phase, SHUT);
     settle(M, first, phase, t, shift, SHUT, struck);

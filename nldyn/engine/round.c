@@ -5,9 +5,16 @@
  * X along both; with r = |X|, n = X/r and t, n turned from the first direction to the second, a ring
  * of clearance c has the penetration δ = r - c, a pin δ = c - r, and the forces
  *
- *     F = N(δ, δ') (± n + ρ t),
+ *     F = N(δ, δ') (± n) + T t,
  *
- * that friction by ρ = ±μ in the sense in which the surface of what turns slides. */
+ * with T = ±μN in the sense in which the surface slides. Where it sticks, T keeps the speed of the
+ * surface, t . X' + v_s, at zero: with the accelerations X'' = a - M F, M the mobilities between both
+ * directions,
+ *
+ *     t . X'' = (t . X') (n . X') / r.
+ *
+ * The row of the second direction has the friction: fl->slides tells of it, its events are those of
+ * sliding and sticking. */
 #include "engine.h"
 
 /* what is taken from an output for the number that a panel knows: a gap, a centre's place */
@@ -36,36 +43,81 @@ static Polar polar(const Flow *fl, int s, const double *place, const double *spe
     return at;
 }
 
-/* direction of the force per unit of the normal force */
-static void rubbing(const Flow *fl, int s, const Polar *at, double *along)
+/* friction T and its derivatives: by the normal force, by a turn of n, by the radius, by the rates
+ * along n and t, by the acceleration along t without the own forces */
+typedef struct {
+    double force, share, by_turn, by_radius, by_out, by_across, by_push;
+} Friction;
+
+/* that of sliding, or what holds the surface; 0 without accelerations `push`, (2,) */
+static Friction round_friction(const Flow *fl, int s, const Polar *at, const double *speed,
+                               const double *push, double normal)
 {
-    const Stop *stop = stop_of(fl, s);
-    along[0] = stop->sense * at->n[0] - stop->rub * at->n[1];
-    along[1] = stop->sense * at->n[1] + stop->rub * at->n[0];
+    int second = (int)stop_of(fl, s)->second;
+    const double *n = at->n, t[2] = {-n[1], n[0]};
+    Friction found = {0.0};
+    if (!sticks_around(fl, second)) {
+        found.share = fl->slides[second] * stop_of(fl, s)->rub;
+        found.force = found.share * normal;
+        return found;
+    }
+    if (!push) return found;
+    double both = 0.0, along = 0.0, across = 0.0; /* n M n, n M t, t M t */
+    int rows[2] = {s, second};
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++) {
+            double mobility = between(fl, rows[i], rows[j]);
+            both += n[i] * mobility * n[j];
+            along += n[i] * mobility * t[j];
+            across += t[i] * mobility * t[j];
+        }
+    double sense = stop_of(fl, s)->sense, out = n[0] * speed[0] + n[1] * speed[1], r = at->radius;
+    found.share = -sense * along / across;
+    found.by_push = 1.0 / across;
+    found.by_across = -out / (r * across);
+    found.by_out = -at->across / (r * across);
+    found.by_radius = at->across * out / (r * r * across);
+    found.force = (t[0] * push[0] + t[1] * push[1] - at->across * out / r) / across +
+                  found.share * normal;
+    found.by_turn = (squared(out) - squared(at->across)) / (r * across) -
+                    (n[0] * push[0] + n[1] * push[1] + normal * sense * (across - both)) / across +
+                    2.0 * found.force * along / across;
+    return found;
 }
 
-/* Forces (2,) of a closed one along both directions; fills their derivatives by the displacements
- * and by the rates, each (2, 2) with a row for each force: with the normal force's slope K and
- * viscosity C
+/* direction of what the force changes by with the normal force */
+static void rubbing(double sense, double share, const Polar *at, double *along)
+{
+    along[0] = sense * at->n[0] - share * at->n[1];
+    along[1] = sense * at->n[1] + share * at->n[0];
+}
+
+/* Forces (2,) of a closed one along both directions; fills their derivatives by the displacements,
+ * the rates and the accelerations `push` without the own forces, each (2, 2) with a row for each
+ * force: with the normal force's slope K and viscosity C, and the friction's share T_N
  *
- *     dF = (± n + ρ t) (K dδ + C dδ') + N/r (± t - ρ n) (t . dX). */
+ *     dF = (± n + T_N t) (K dδ + C dδ') + (dT - T_N dN) t + (± N t - T n) (t . dX) / r. */
 static void round_law(const Flow *fl, int s, const double *place, const double *speed,
-                      double *force, double *slope, double *viscosity)
+                      const double *push, double *force, double by[3][4])
 {
     Polar at = polar(fl, s, place, speed);
-    double sense = stop_of(fl, s)->sense, along[2], t[2] = {-at.n[1], at.n[0]};
+    double sense = stop_of(fl, s)->sense, along[2], *n = at.n, t[2] = {-n[1], n[0]};
     Force normal = closed_law(fl, s, at.depth, at.rate);
     double turn = at.radius > 0.0 ? 1.0 / at.radius : 0.0;
-    rubbing(fl, s, &at, along);
+    Friction held = round_friction(fl, s, &at, speed, push, normal.force);
+    rubbing(sense, held.share, &at, along);
     for (int i = 0; i < 2; i++) {
-        double turned_along = i == 0 ? -along[1] : along[0];
-        force[i] = along[i] * normal.force;
+        double turned_force = sense * normal.force * t[i] - held.force * n[i];
+        force[i] = sense * normal.force * n[i] + held.force * t[i];
         for (int j = 0; j < 2; j++) {
             double rate_by = sense * at.across * turn * t[j];
-            slope[2 * i + j] =
-                along[i] * (normal.stiffness * sense * at.n[j] + normal.viscosity * rate_by) +
-                normal.force * turn * turned_along * t[j];
-            viscosity[2 * i + j] = along[i] * normal.viscosity * sense * at.n[j];
+            by[0][2 * i + j] =
+                along[i] * (normal.stiffness * sense * n[j] + normal.viscosity * rate_by) +
+                turn * turned_force * t[j] +
+                t[i] * (held.by_turn * turn * t[j] + held.by_radius * n[j]);
+            by[1][2 * i + j] = along[i] * normal.viscosity * sense * n[j] +
+                               t[i] * (held.by_out * n[j] + held.by_across * t[j]);
+            by[2][2 * i + j] = t[i] * held.by_push * t[j];
         }
     }
 }
@@ -100,7 +152,7 @@ static Course depth_now(const Flow *fl, int s, const double *w, double phase)
     return (Course){at.depth, at.rate, stop_of(fl, s)->sense * push, 0.0};
 }
 
-/* force of a row, sliders that stops press on left out */
+/* force of a row; sliders that stops press on, and what holds a surface, are left out */
 static double force_now(const Flow *fl, int s, const double *w, double phase)
 {
     if (!is_planar(fl, s)) {
@@ -108,10 +160,10 @@ static double force_now(const Flow *fl, int s, const double *w, double phase)
         return law(fl, s, depth.value, depth.first).force;
     }
     int lead = is_round(fl, s) ? s : (int)stop_of(fl, s)->lead;
-    double place[2], speed[2], pace[2], force[2], by[4], by_speed[4];
+    double place[2], speed[2], pace[2], force[2], by[3][4];
     round_now(fl, lead, w, phase, place, speed, pace);
     if (!(polar(fl, lead, place, speed).depth > 0.0)) return 0.0;
-    round_law(fl, lead, place, speed, force, by, by_speed);
+    round_law(fl, lead, place, speed, NULL, force, by);
     return force[lead == s ? 0 : 1];
 }
 
@@ -150,6 +202,31 @@ static double gap_noise(const Flow *fl, int out, const double *w)
                                    fabs(stop_of(fl, (int)stop->second)->centre));
 }
 
+/* speed (value) at which the surface slides in a round clearance, whose second direction is `s`, and
+ * its rate in flight (first) */
+static Course round_slip(const Flow *fl, int s, const double *w, double phase)
+{
+    double place[2], speed[2], pace[2];
+    int lead = (int)stop_of(fl, s)->lead;
+    round_now(fl, lead, w, phase, place, speed, pace);
+    Polar at = polar(fl, lead, place, speed);
+    double out = at.n[0] * speed[0] + at.n[1] * speed[1];
+    double push = at.n[0] * pace[1] - at.n[1] * pace[0];
+    return (Course){at.across + stop_of(fl, s)->surface, push - at.across * out / at.radius, 0.0, 0.0};
+}
+
+/* rounding error of that speed */
+static double round_slip_noise(const Flow *fl, int s, const double *w, double phase)
+{
+    double place[2], speed[2], pace[2], noise = SUM_ROUNDING * fabs(stop_of(fl, s)->surface);
+    int rows[2] = {(int)stop_of(fl, s)->lead, s};
+    round_now(fl, rows[0], w, phase, place, speed, pace);
+    double turning = hypot(speed[0], speed[1]) / hypot(place[0], place[1]);
+    for (int d = 0; d < 2; d++)
+        noise += rate_noise(fl, rows[d], w) + turning * output_noise(fl, rows[d], w);
+    return noise;
+}
+
 /* velocity jump of the penetration per unit impulse, in 1/kg */
 static double mobility_now(const Flow *fl, int s, const double *w, double phase)
 {
@@ -172,12 +249,17 @@ static int place_of(const Panel *panel, int stop)
     return place;
 }
 
-/* that of the other direction of a round clearance, or -1 */
+/* row of the other direction of a round clearance, or -1 */
+static int partner_row(const Flow *fl, int s)
+{
+    return (int)(is_round(fl, s) ? stop_of(fl, s)->second : stop_of(fl, s)->lead);
+}
+
+/* its place among the closed ones, or -1 */
 static int partner_of(const Flow *fl, const Panel *panel, int a)
 {
-    const Stop *stop = stop_of(fl, panel->active[a]);
-    if (stop->second >= 0.0) return place_of(panel, (int)stop->second);
-    return stop->lead >= 0.0 ? place_of(panel, (int)stop->lead) : -1;
+    int row = partner_row(fl, panel->active[a]);
+    return row < 0 ? -1 : place_of(panel, row);
 }
 
 /* how the forces of place a change by the output o of the other direction, (m,), among `slope` */

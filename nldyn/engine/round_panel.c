@@ -22,22 +22,21 @@ static void add_crossed(const Flow *fl, const Panel *panel, int o, double sign,
 static void round_forces(const Flow *fl, Panel *panel, int a, double *slope)
 {
     int na = panel->na, m = panel->m, s = panel->active[a], places[2] = {a, partner_of(fl, panel, a)};
-    bool rates = panel->outputs > na;
+    int orders = panel->outputs / na;
     for (int i = 0; i < m; i++) {
-        double place[2], speed[2] = {0.0, 0.0}, force[2], by[4], by_speed[4];
-        for (int d = 0; d < 2; d++) {
-            place[d] = panel->output[places[d] * m + i];
-            if (rates) speed[d] = panel->output[(na + places[d]) * m + i];
-        }
-        round_law(fl, s, place, speed, force, by, by_speed);
-        panel->radial[a * m + i] = polar(fl, s, place, speed).depth;
+        double at[3][2] = {{0.0}}, force[2], by[3][4];
+        for (int order = 0; order < orders; order++)
+            for (int d = 0; d < 2; d++)
+                at[order][d] = panel->output[(order * na + places[d]) * m + i];
+        round_law(fl, s, at[0], at[1], at[2], force, by);
+        panel->radial[a * m + i] = polar(fl, s, at[0], at[1]).depth;
         for (int d = 0; d < 2; d++) {
             int own = places[d] * m + i, cross = panel->outputs * m + own;
             panel->F[own] = force[d];
-            slope[own] = by[3 * d];
-            slope[cross] = by[d + 1];
-            if (rates) slope[na * m + own] = by_speed[3 * d];
-            if (rates) slope[na * m + cross] = by_speed[d + 1];
+            for (int order = 0; order < orders; order++) {
+                slope[order * na * m + own] = by[order][3 * d];
+                slope[order * na * m + cross] = by[order][d + 1];
+            }
         }
     }
 }
@@ -48,15 +47,16 @@ static void add_round_columns(const Flow *fl, const Panel *panel, int o, int i, 
                               double *forces)
 {
     int na = panel->na, m = panel->m, s = panel->active[o], rows[2] = {s, (int)stop_of(fl, s)->second};
-    int places[2] = {o, place_of(panel, rows[1])};
-    double place[2], speed[2] = {0.0, 0.0}, along[2];
+    int places[2] = {o, place_of(panel, rows[1])}, way = fl->slides[rows[1]];
+    double place[2], speed[2] = {0.0, 0.0}, along[2], still[2] = {0.0, 0.0};
     for (int d = 0; d < 2; d++) {
         place[d] = panel->output[places[d] * m + i];
         if (panel->outputs > na) speed[d] = panel->output[(na + places[d]) * m + i];
     }
     Polar at = polar(fl, s, place, speed);
-    double pressed = closed_law(fl, s, at.depth, at.rate).force;
-    rubbing(fl, s, &at, along);
+    double pressed = closed_law(fl, s, at.depth, at.rate).force, sense = stop_of(fl, s)->sense;
+    rubbing(sense, round_friction(fl, s, &at, speed, still, pressed).share, &at, along);
+    if (stop_of(fl, s)->rub == 0.0) way = at.across + stop_of(fl, s)->surface > 0.0 ? 1 : -1;
     for (int c = 0; c < fl->n_parameters; c++) {
         int64_t column = fl->parameters[2 * c], row = fl->parameters[2 * c + 1];
         for (int d = 0; d < 2 && column >= GAP; d++) {
@@ -67,44 +67,32 @@ static void add_round_columns(const Flow *fl, const Panel *panel, int o, int i, 
             if (column == CENTRE && row == rows[1]) *force -= d == 1 ? *slope : *cross;
             if (row != s || column == CENTRE) continue;
             if (column == RUB)
-                *force += copysign(1.0, stop_of(fl, s)->surface) * pressed *
-                          (d == 0 ? -at.n[1] : at.n[0]);
+                *force += way * pressed * (d == 0 ? -at.n[1] : at.n[0]);
             else
                 *force += along[d] * law_by(fl, s, column, at.depth, at.rate) *
-                          (column == GAP ? stop_of(fl, s)->sense : 1.0);
+                          (column == GAP ? sense : 1.0);
         }
     }
 }
 
-/* Whether the surface of what turns slides the other way somewhere in a panel, or rests, where a
- * round clearance rubs: its friction is that of sliding one way. */
-static bool sliding_turns(const Motion *M, double phase, double h)
+/* fill values (m,) at the nodes of a panel, positive as long as the surface slides on in a round
+ * clearance, whose second direction is `s`, or sticks without more force than its friction to one
+ * `side` */
+static void show_rubbing(const Flow *fl, const Panel *panel, int s, int side, double *values)
 {
-    const Flow *fl = M->fl;
-    const Panel *panel = M->panel;
-    int na = panel->na, m = panel->m, n_fine = (int)M->tab->n_fine;
-    double place[2], speed[2], pace[2], *values = M->s->values;
-    for (int a = 0; a < na && panel->round; a++) {
-        int s = panel->active[a];
-        double surface = stop_of(fl, s)->surface, sense = copysign(1.0, surface);
-        if (!is_round(fl, s) || stop_of(fl, s)->rub == 0.0) continue;
-        for (int i = 0; i < m + 2; i++) {
-            const double *output = panel->output + i - 1;
-            int partner = partner_of(fl, panel, a);
-            if (i == 0)
-                round_now(fl, s, M->w, phase, place, speed, pace);
-            else if (i == m + 1)
-                round_now(fl, s, M->w_end, phase + fl->omega * h, place, speed, pace);
-            for (int d = 0; d < 2 && 0 < i && i <= m; d++) {
-                int row = d == 0 ? a : partner;
-                place[d] = output[row * m];
-                speed[d] = output[(na + row) * m];
-            }
-            values[i] = sense * (polar(fl, s, place, speed).across + surface);
+    int na = panel->na, m = panel->m, lead = (int)stop_of(fl, s)->lead;
+    int places[2] = {place_of(panel, lead), place_of(panel, s)};
+    for (int i = 0; i < m; i++) {
+        double place[2], speed[2], force[2];
+        for (int d = 0; d < 2; d++) {
+            place[d] = panel->output[places[d] * m + i];
+            speed[d] = panel->output[(na + places[d]) * m + i];
+            force[d] = panel->F[places[d] * m + i];
         }
-        refine(M->tab, values, M->s->fine);
-        for (int i = 0; i < n_fine; i++)
-            if (!(M->s->fine[i] > 0.0)) return true;
+        Polar at = polar(fl, lead, place, speed);
+        double normal = stop_of(fl, s)->sense * (at.n[0] * force[0] + at.n[1] * force[1]);
+        values[i] = fl->slides[s] != 0
+                        ? fl->slides[s] * (at.across + stop_of(fl, s)->surface)
+                        : grip(fl, s) * normal - side * (at.n[0] * force[1] - at.n[1] * force[0]);
     }
-    return false;
 }

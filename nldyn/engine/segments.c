@@ -89,7 +89,7 @@ static void pass_event(Motion *M, int event, double h)
 {
     double here = M->phase + M->fl->omega * M->t;
     M->start_switch = 0;
-    if (is_slider(M->fl, event)) {
+    if (rubs(M->fl, event)) {
         slide_or_stick(M, event, here, M->t);
     } else if (is_rigid(M->fl, event)) {
         if (M->closed[event]) {
@@ -187,7 +187,6 @@ static int take_panel(Motion *M, double here, const Trial *trial)
     const Flow *fl = M->fl;
     double h = trial->h;
     if (!end_is_finite(M)) return CONTACT_FAILED;
-    if (sliding_turns(M, here, h)) return SLIDING_TURNS;
     if (M->recording && !record_panel(M, here, h, trial->kind, trial->aim)) return RECORD_FULL;
     for (int a = 0; a < panel->na; a++) {
         if (HALF_ULP * panel->decay[a] > WORST_ROUNDING) return ROUNDED;

@@ -52,9 +52,18 @@ static void lay_out_flow(Block *block, const System *sys, int n_parameters,
     fl->forced = room(block, amplitudes * fl->n_out, sizeof(Complex));
 }
 
+/* most derivatives that panels have outputs of, with the outputs themselves */
+static size_t most_orders(const Flow *fl)
+{
+    for (int s = 0; s < fl->n_stops; s++)
+        if (rubs_around(fl, s)) return 3;
+    return 2;
+}
+
 static void lay_out_panel(Block *block, const Flow *fl, int m, Panel *panel)
 {
-    size_t na = fl->n_stops, nodes = na * m, outputs = 2 * nodes, size = fl->size;
+    size_t na = fl->n_stops, nodes = na * m, size = fl->size;
+    size_t outputs = most_orders(fl) * nodes;
     panel->m = m;
     panel->active = indices(block, na);
     panel->output = numbers(block, outputs);
@@ -82,22 +91,23 @@ static void lay_out_panel(Block *block, const Flow *fl, int m, Panel *panel)
 static void lay_out_contacts(Block *block, const Flow *fl, const Gauss *tab, Scratch *s)
 {
     size_t m = tab->m, na = fl->n_stops, nodes = na * m, size = fl->size;
+    size_t orders = most_orders(fl);
     s->times = numbers(block, m);
     s->waves = numbers(block, 6 * m);
     s->product = numbers(block, m * m);
-    s->free = numbers(block, 2 * nodes);
-    s->new_slope = numbers(block, 4 * nodes);
+    s->free = numbers(block, orders * nodes);
+    s->new_slope = numbers(block, 2 * orders * nodes);
     s->solved = numbers(block, nodes);
     s->step = numbers(block, nodes);
-    s->led = numbers(block, 2 * nodes);
+    s->led = numbers(block, orders * nodes);
     s->guess = numbers(block, m);
-    s->rounding = numbers(block, 2 * na);
-    s->noise = numbers(block, 2 * na);
+    s->rounding = numbers(block, orders * na);
+    s->noise = numbers(block, orders * na);
     s->inner = numbers(block, m);
     s->values = numbers(block, m + 2);
     s->fine = numbers(block, tab->n_fine);
     s->driven = numbers(block, size * m);
-    s->slopes = numbers(block, 4 * nodes);
+    s->slopes = numbers(block, 2 * orders * nodes);
     s->forced = numbers(block, na);
     s->swayed = numbers(block, na);
     s->viscosity = numbers(block, na);
@@ -128,6 +138,7 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     s->first_pushes = numbers(block, na);
     s->held = numbers(block, na);
     s->drags = numbers(block, na);
+    s->across = numbers(block, na);
     s->mobility = numbers(block, na * na);
     s->resting = indices(block, na);
     s->mobility_order = indices(block, na);

@@ -37,7 +37,6 @@ from nldyn.engine.layout import (
     RECORD_FULL,
     ROUNDED,
     SINGULAR,
-    SLIDING_TURNS,
     TOO_MANY_PIECES,
     TOO_MANY_STEPS,
     UNDECIDED,
@@ -81,8 +80,6 @@ _REASONS = {
     SINGULAR: "singular Jacobian",
     NOT_CONVERGED: "Newton's method did not converge",
     OTHER_CONTACTS: "the number of contacts changes within the step",
-    SLIDING_TURNS: "the whirl takes the sliding speed in a round clearance through zero: there the "
-    "surface would stick or slide the other way, which is not known",
     UNDECIDED: "with the friction at the rigid stop at '{at}' (stop {stop}) no force, or more than "
     "one, holds what rests on it at phase {phase:.6g} rad, since it is so large (Painlevé's "
     "paradox) or friction at another stop shares that force: what happens there is not decided",

@@ -72,7 +72,7 @@ def stop_row(
         gap=stop.clearance,
         centre=stop.eccentricity[0],
         sense=stop.sense,
-        rub=stop.rub,
+        rub=stop.friction,
         surface=stop.sliding_speed,
     )
 
@@ -82,9 +82,12 @@ def second_row(stop: RoundStop, lead: int, mobility: float, options: FlowOptions
     return _NO_STOP._replace(
         mobility=mobility,
         exponent=stop.exponent,
-        instant=options.instant(stop.exponent),
+        instant=options.instant(0.0 if stop.friction else stop.exponent),
         lead=float(lead),
         centre=stop.eccentricity[1],
+        sense=stop.sense,
+        rub=stop.friction,
+        surface=stop.sliding_speed,
     )
 
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.flow.flow_map import FlowMap, Trajectory
 from nldyn.flow.rigid_impacts import RigidImpacts, rigid_impacts, states_before
-from nldyn.flow.sliding import held_in_pieces
+from nldyn.flow.sliding import held_in_pieces, round_friction
 from nldyn.system.friction import Slider
-from nldyn.system.round_stop import RoundStop
+from nldyn.system.round_stop import Polar, RoundStop
 
 BEHIND = 1e-9  # of them: depth of a state that lies behind a rigid stop
 STILL = 1e-9  # of the largest speed at a stop: one that counts as none
@@ -136,12 +136,14 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
         order = np.argsort(phases, kind="stable")
         states = states.copy()
         states[order] = motion.states(phases[order])
-    modal = flow.to_modal(states)
+    modal, around = flow.to_modal(states), []
     for i, stop in system.elastic_stops.items():
         pushed = stop.force(*system.depth_and_speed(stop, modal))
         if isinstance(stop, RoundStop):
-            along = stop.along(system.round_polar(stop, modal))
+            at, sticks = system.round_polar(stop, modal), round_friction(motion, i)[2][piece]
+            along = np.where(sticks[:, None], stop.sense * at.normal, stop.along(at))
             rates -= pushed[:, None] * along @ flow.force_columns[:, flow.round_rows[i]].T
+            around.append((sticks, stop, at, flow.round_rows[i]))
         else:
             rates -= pushed[:, None] * flow.force_columns[:, i]
     first = len(system.stops)
@@ -168,18 +170,39 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
         pulled = bond.force(states @ flow.rows[i], states @ flow.rate_rows[i])
         rates -= pulled[:, None] * flow.force_columns[:, i]
     acting = np.r_[rigid, first : first + len(system.sliders)]
-    pace = states @ data.rows[2, acting].T + rates @ flow.rate_rows[acting].T
-    mobility = flow.mobility(acting.tolist())
-    for k in np.flatnonzero(rests.any(axis=1)):
-        held = np.flatnonzero(np.r_[rests[k], holds[k]])
-        taken = mobility.copy()
+    rows = flow.rate_rows[acting]
+    pace = states @ data.rows[2, acting].T + rates @ rows.T
+    for k in np.flatnonzero(rests.any(axis=1)).tolist():
+        more = [
+            _held_across(flow, stop, at, plane, k, states[k], rates[k])
+            for sticks, stop, at, plane in around
+            if sticks[k]
+        ]
+        held = np.flatnonzero(np.r_[rests[k], holds[k], np.ones(len(more), dtype=bool)])
+        pushed = np.column_stack([flow.force_columns[:, acting], *(column for _, column, _ in more)])
+        taken = np.vstack([rows, *(row for row, _, _ in more)]) @ pushed
         for i, slider in enumerate(system.sliders):
             if slider.stop in system.rigid_stops:
                 place = int(np.searchsorted(rigid, slider.stop))
-                taken[:, place] += rubs[k, slider.stop] * mobility[:, rigid.size + i]
-        found = np.linalg.solve(taken[np.ix_(held, held)], pace[k, held])
+                taken[:, place] += rubs[k, slider.stop] * taken[:, rigid.size + i]
+        paces = np.r_[pace[k], [each for _, _, each in more]]
+        found = np.linalg.solve(taken[np.ix_(held, held)], paces[held])
         forces[k, rigid[held[held < rigid.size]]] = found[held < rigid.size]
     return forces
+
+
+def _held_across(
+    flow: FlowMap, stop: RoundStop, at: Polar, plane: list[int], k: int, state: Real, rate: Real
+) -> tuple[Real, Real, float]:
+    """How a state z moves along the circle where it sticks in a round clearance, at place k.
+
+    The row of its rate, the column of a unit force, and what that force must take away.
+    """
+    across = at.across[k]
+    row, column = across @ flow.rate_rows[plane], flow.force_columns[:, plane] @ across
+    whirl, out = at.sliding[k] - stop.sliding_speed, stop.sense * at.rate[k]
+    pace = state @ (across @ flow._data.rows[2, plane]) + rate @ row
+    return row, column, float(pace - whirl * out / at.radius[k])
 
 
 def _normal_force(flow: FlowMap, slider: Slider, states: Real) -> Real:

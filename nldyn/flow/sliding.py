@@ -16,6 +16,7 @@ from nldyn.system.friction import Slider
 UNMOVED = 1e-9  # of the largest displacement: a way that counts as none where a slider is held
 ROUNDING = 1e-13  # the same where it is not
 ALIKE = 1e-6  # relative difference of a held slider's acceleration from what its force takes away
+LESS = 1e-9  # of the most friction in a round clearance: by so much it is below where it sticks
 
 
 @dataclass(frozen=True)
@@ -170,9 +171,11 @@ def _touching(motion: Trajectory, stop: int) -> NDArray[np.intp]:
 
 
 def _round_measures(motion: Trajectory, ring: Slider, ends: Real) -> SliderMeasures:
-    """Measures of what slides in a round clearance; it never sticks."""
-    flow, rec, mu = motion.flow, motion.record, ring.friction.coefficient
+    """Measures of what slides in a round clearance."""
+    flow, rec = motion.flow, motion.record
     stop, panels = flow.system.round_stops[ring.stop], _touching(motion, ring.stop)
+    pressed, across, stuck = round_friction(motion, ring.stop)
+    pressed, across, sticks = pressed[panels], across[panels], stuck[panels]
     places = []
     for row, centre in zip(flow.round_rows[ring.stop], stop.eccentricity, strict=True):
         at = ends @ flow.rows[row] - centre
@@ -181,23 +184,52 @@ def _round_measures(motion: Trajectory, ring: Slider, ends: Real) -> SliderMeasu
     dx, dy = (_ways_of_nodes(flow, place) for place in places)
     way = (x * dy - y * dx) / np.hypot(x, y)
     way = np.abs(way - ring.friction.base_speed * _times_of_nodes(motion, panels))
-    pressed = motion.contacts_at_nodes[1][panels, ring.stop]
-    forces = np.abs(pressed @ fine_table(flow.tables.nodes.size).T)
-    time, slid = float(rec.duration.sum()), float(rec.duration[panels].sum())
+    way[sticks] = 0.0
+    forces = np.abs(across @ fine_table(flow.tables.nodes.size).T)
+    time, closed = float(rec.duration.sum()), rec.duration[panels]
     pressed_distance = float((pressed * way).sum())
+    loss = ring.friction.coefficient * pressed_distance
     return SliderMeasures(
         ring,
         False,
-        mu * float(peaks(forces).max(initial=0.0)),
+        float(peaks(forces).max(initial=0.0)),
         float(way.sum()),
-        0.0,
-        slid / time,
-        1.0 - slid / time,
-        mu * pressed_distance,
+        float(closed[sticks].sum()) / time,
+        float(closed[~sticks].sum()) / time,
+        1.0 - float(closed.sum()) / time,
+        loss,
         pressed_distance,
-        mu * pressed_distance / time,
+        loss / time,
         pressed_distance / time,
     )
+
+
+def round_friction(motion: Trajectory, stop: int) -> tuple[Real, Real, NDArray[np.bool_]]:
+    """Normal force and friction (pieces, m) in a round clearance, and where it sticks, (pieces,).
+
+    Friction is that from the first direction to the second, which holds the body back.
+    """
+    flow, rec = motion.flow, motion.record
+    ring, rows = flow.system.round_stops[stop], flow.round_rows[stop]
+    away, force = rec.depth[:, rows], rec.force[:, rows]
+    radius = np.hypot(away[:, 0], away[:, 1])
+    normal = away / np.where(radius > 0.0, radius, 1.0)[:, None]
+    pressed = ring.sense * (normal * force).sum(axis=1)
+    across = normal[:, 0] * force[:, 1] - normal[:, 1] * force[:, 0]
+    most = ring.friction * pressed
+    left = (most - np.abs(across)).max(axis=1) > LESS * most.max(axis=1)
+    return pressed, across, np.asarray(left & (ring.friction > 0.0))
+
+
+def slides_one_way(motion: Trajectory) -> bool:
+    """Whether what rubs in round clearances slides the same way all the time."""
+    for number, stop in motion.flow.system.round_stops.items():
+        if stop.friction:
+            _, across, sticks = round_friction(motion, number)
+            ways = np.sign(across[_touching(motion, number)].sum(axis=1))
+            if sticks.any() or np.unique(ways).size > 1:
+                return False
+    return True
 
 
 def held_in_pieces(motion: Trajectory, number: int) -> NDArray[np.bool_]:

@@ -298,7 +298,8 @@ def _grown(
     flow: FlowMap, state: Real, omega: float, before: int, periods: int, parts: int, basis: Real
 ) -> tuple[Real, Real, float]:
     """Last state, stretches per period (periods, 2n) and ∫ of the stops' damping, in blocks."""
-    lossy = flow.system.loses_by_speed
+    rubs = any(stop.friction for stop in flow.system.round_stops.values())
+    lossy = flow.system.loses_by_speed or rubs
     stretches = np.empty((periods, state.size))
     viscous = lost = 0.0
     at_once = periods_at_once(flow, BLOCK)

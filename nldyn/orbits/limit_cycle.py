@@ -161,9 +161,9 @@ def _repeated(flow: FlowMap, state: Real, omega: float, observe: str) -> tuple[R
     inside = tops[(tops > 0.0) & (tops < phases[-1])]
     states = motion.states(inside)
     size = float(np.ptp(states, axis=0).max(initial=0.0)) if len(states) else 0.0
-    whole = np.linalg.norm(motion.states(np.linspace(0.0, phases[-1], 200)), axis=1)
-    size = max(size, float(np.ptp(whole)))
-    if len(states) < 2 or size <= STILL * float(whole.max()):
+    whole = motion.states(np.linspace(0.0, phases[-1], 200))
+    size = max(size, float(np.ptp(whole, axis=0).max()))
+    if len(states) < 2 or size <= STILL * float(np.linalg.norm(whole, axis=1).max()):
         raise ConvergenceError(
             f"the motion comes to rest, or no cycle ends within {TRANSIENT} of "
             f"{omega / (2.0 * math.pi):g} Hz: give another start, or frequency_hz"

@@ -22,7 +22,7 @@ from nldyn.flow.rigid import (
     series_to_rest,
 )
 from nldyn.flow.rigid_impacts import rigid_impacts
-from nldyn.flow.sliding import SliderMeasures, slider_measures
+from nldyn.flow.sliding import SliderMeasures, slider_measures, slides_one_way
 from nldyn.orbits.areas import AreaMeasures, area_measures
 from nldyn.orbits.critical_functions import Critical
 from nldyn.orbits.history import History
@@ -345,7 +345,8 @@ class Orbit:
         v² is the velocity jump per unit impulse at a stop whose force depends on the speed. An
         impact with a rigid stop multiplies the determinant by e (e + v de/dv). The
         determinant is the product of those of the segments. The error is nan where damping is so
-        strong that rounding hides the third digit of 1e-6 even so, and with dry friction.
+        strong that rounding hides the third digit of 1e-6 even so, and with dry friction, in round
+        clearances where it turns or sticks.
         """
         if self.system.sliders:
             return math.nan
@@ -354,7 +355,7 @@ class Orbit:
             return math.nan
         exact = -float(np.trace(self.system.total_damping)) * self.duration
         exact -= contact_damping(self.problem.flow, self.trajectory)
-        if math.isinf(exact):  # at rest on a rigid stop, or without rebound: directions are lost
+        if not math.isfinite(exact):  # at rest, without rebound, or stuck: directions are lost
             return math.nan
         off = min(value - exact, LARGEST_EXPONENT)
         return math.inf if math.isnan(value) else abs(math.expm1(off))
@@ -714,9 +715,12 @@ def _carried(system: System, interface: str, phases: Real, omega: float | Real) 
 def contact_damping(flow: FlowMap, motion: Trajectory) -> float:
     """∫ Σ v² ∂F/∂δ' dt over the contacts of a motion, by the quadrature of their panels.
 
-    With -ln of what impacts with rigid stops make of a volume of states.
+    With -ln of what impacts with rigid stops make of a volume of states. It is nan where what rubs
+    in a round clearance turns or sticks.
     """
     system = flow.system
+    if not slides_one_way(motion):
+        return math.nan
     contraction = impact_contraction(motion)
     if not system.loses_by_speed:
         return contraction

@@ -123,7 +123,7 @@ def check_exact(system: System, parameter: Parameter) -> None:
             raise SystemModelError(f"parameter '{name}': stops[{index}] is no round clearance")
         if name == "rubbing_friction" and system.round_stops[index].surface_speed is None:
             raise SystemModelError(
-                f"parameter '{name}': stops[{index}] has no surface_speed, in whose sense it slides"
+                f"parameter '{name}': stops[{index}] has no surface_speed, which friction needs"
             )
     elif name in SOURCES:
         check_index(parameter, "excitation", len(system.excitation))

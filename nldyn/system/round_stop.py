@@ -56,11 +56,9 @@ class RoundStop:
     pin that stands c away from touching. The force :math:`N = k\,\delta^p (1 + a\dot\delta)` acts
     along the radius.
 
-    With friction the surface of the body slides one way while it touches, and :math:`\mu N` acts
-    along the circle, against the sliding. A body that turns slides in the sense of its surface, as
-    long as that is faster than the whirl goes round. One that does not turn, such as a tube in its
-    support, slides by its whirl alone, which goes from the first direction to the second. Where the
-    sliding speed would go through zero, the motion is refused.
+    With friction :math:`\mu N` acts along the circle, against the speed at which the surface of the
+    body slides: by its whirl, and by its turning, where it turns. Where that speed is zero it
+    sticks, without giving way, as long as that takes no more than :math:`\mu N`: it rolls.
 
     Parameters
     ----------
@@ -83,7 +81,7 @@ class RoundStop:
     law : callable, optional
         Another law of the normal force, see `Stop`.
     friction : float
-        Coefficient μ of sliding.
+        Coefficient μ, sliding and at rest.
     surface_speed : float, optional
         Speed in m/s of the surface that turns, ΩR of a rotor, needed where there is friction;
         positive if the body turns from the first direction to the second, 0 if it does not turn.
@@ -202,7 +200,7 @@ class RoundStop:
 
     @property
     def rub(self) -> float:
-        """Coefficient of friction in the sense of sliding."""
+        """Coefficient of friction in the sense of the surface that turns, without the whirl."""
         return float(np.copysign(self.friction, self.sliding_speed))
 
     @property
@@ -267,8 +265,8 @@ class RoundStop:
         return Polar(radius, normal, depth, rate, whirl + self.sliding_speed)
 
     def along(self, at: Polar) -> Real:
-        """Forces (k, 2) that hold the body back, per unit of the normal force."""
-        return self.sense * at.normal + self.rub * at.across
+        """Forces (k, 2) that hold the body back where it slides, per unit of the normal force."""
+        return self.sense * at.normal + (self.friction * np.sign(at.sliding))[:, None] * at.across
 
 
 def _check_pair(owner: str, name: str, pair: object) -> None:

@@ -23,6 +23,7 @@ from nldyn import (
     Unbalance,
     continue_branch,
     impacts,
+    limit_cycle,
     load,
     save,
     simulate,
@@ -30,12 +31,13 @@ from nldyn import (
 )
 from nldyn.app.describe import describe_rest
 from nldyn.branches.tables import orbit_columns
+from nldyn.flow.sliding import slider_measures
 from nldyn.orbits.bordered import length_unit
 from nldyn.system import DryFriction
 from nldyn.system.chart import value_of, with_value
 from nldyn.system.equilibrium import rest
 from nldyn.system.naming import slider_name
-from tests.rubbing import Ring, Rotor
+from tests.rubbing import Ring, Rotor, turns
 
 MASS, STIFFNESS, DAMPING, CLEARANCE = 2.0, 8e3, 6.0, 1e-3
 PLANE = {"x": [1.0, 0.0], "y": [0.0, 1.0]}
@@ -146,7 +148,7 @@ def elliptic(sense=-1.0, inside=True):
         stops=[ring], excitation=forces,
     )  # fmt: skip
     rows = np.eye(2)
-    same = Ring(rows, 5e4, CLEARANCE, 1.0, ring.eccentricity, ring.sense, 0.0, ring.rub)
+    same = Ring(rows, 5e4, CLEARANCE, 1.0, ring.eccentricity, ring.sense, friction=0.2)
 
     def rotor(w):
         def load(t):
@@ -181,10 +183,77 @@ def test_a_table_goes_on_to_where_there_is_no_friction():
     assert branch.points[order[0]].friction[0].work_rate > 0.0
 
 
-def test_what_whirls_the_other_way_is_refused():
-    system, _ = elliptic(sense=1.0)
-    with pytest.raises(ConvergenceError, match="sliding speed"):
-        solve_orbit(system, 8.5)
+def test_what_whirls_the_other_way_does_the_same_in_a_mirror():
+    one, other = (solve_orbit(elliptic(sense=sense)[0], 8.5) for sense in (-1.0, 1.0))
+    (there,), (back,) = one.friction, other.friction
+    assert back.loss == pytest.approx(there.loss, rel=1e-9)
+    assert (back.stuck, back.open) == pytest.approx((there.stuck, there.open), abs=1e-9)
+    sizes = [np.sort(np.abs(orbit.multipliers)) for orbit in (one, other)]
+    assert sizes[1] == pytest.approx(sizes[0], abs=1e-9)
+
+
+class Roll:
+    """The backward whirl of a disc that rolls in a ring without slipping, driven by nothing else.
+
+    Its surface has the speed v, so that it goes round at Ω = v/r. With the radial balance
+    m v²/r = K r + k (r - c), and friction that gives what the damper takes, C v: it must be no more
+    than μ N. Small motions keep r φ' = -v, and are m ρ'' + C ρ' + (K + k + m v²/r²) ρ = 0.
+    """
+
+    def __init__(self, surface: float, damping: float = 24.0, friction: float = 0.2):
+        self.v, self.damping, self.stiffness = surface, damping, 5e4
+        K = STIFFNESS + self.stiffness
+        push = self.stiffness * CLEARANCE
+        self.r = (push + math.sqrt(push**2 + 4.0 * K * MASS * surface**2)) / (2.0 * K)
+        self.pressed = self.stiffness * (self.r - CLEARANCE)
+        self.stop = RoundStop(
+            ("x", "y"), self.stiffness, CLEARANCE, 1.0, friction=friction, surface_speed=surface
+        )
+        self.system = System.from_matrices(
+            MASS * np.eye(2), STIFFNESS * np.eye(2), PLANE, damping=damping * np.eye(2),
+            stops=[self.stop],
+        )  # fmt: skip
+        self.w = surface / self.r
+        self.start = math.sqrt(MASS) * np.array([self.r, 0.0, 0.0, -surface])
+
+    @property
+    def multipliers(self):
+        spring = STIFFNESS + self.stiffness + MASS * self.w**2
+        rates = np.roots([MASS, self.damping, spring])
+        return np.array([0.0, *np.exp(rates * 2.0 * math.pi / self.w)])
+
+    @staticmethod
+    def onset(damping: float = 24.0, friction: float = 0.2) -> float:
+        """Least speed at which friction suffices: μ (m Ω² - K) = C Ω, the whip that slides."""
+        w = np.roots([friction * MASS, -damping, -friction * STIFFNESS]).max()
+        return float(w * 5e4 * CLEARANCE / (5e4 + STIFFNESS - MASS * w**2))
+
+
+def test_dry_whip_rolls_backwards_as_in_closed_form():
+    roll = Roll(0.15)
+    cycle = limit_cycle(roll.system, start=1.001 * roll.start, frequency_hz=roll.w / 2.0 / math.pi)
+    assert 2.0 * math.pi * cycle.frequency_hz == pytest.approx(roll.w, rel=1e-12)
+    assert cycle.max_penetration == pytest.approx(roll.r - CLEARANCE, rel=1e-11)
+    gap = np.sort_complex(cycle.multipliers) - np.sort_complex(roll.multipliers)
+    assert np.abs(gap).max() < 1e-10
+    assert cycle.multiplier_along == pytest.approx(1.0, abs=1e-10)
+    assert cycle.stable
+    (found,) = cycle.friction
+    assert (found.stuck, found.loss) == (1.0, 0.0)
+    assert found.peak_force == pytest.approx(24.0 * 0.15, rel=1e-9)  # what the damper takes
+
+
+def test_dry_whip_begins_where_friction_can_hold_it():
+    onset = Roll.onset()
+    for surface, holds in ((onset * (1.0 + 1e-6), True), (onset * (1.0 - 1e-6), False)):
+        roll = Roll(surface)
+        flow = FlowMap(roll.system)
+        motion = flow.trajectory(flow.to_state(roll.start[None]), PERIOD, roll.w)
+        (found,) = slider_measures(motion)
+        assert (found.stuck == 1.0) is holds
+    with pytest.raises(ConvergenceError):  # it comes to rest
+        slow = Roll(0.97 * onset)
+        limit_cycle(slow.system, start=slow.start, frequency_hz=slow.w / 2.0 / math.pi)
 
 
 def test_friction_makes_the_whirl_unstable_where_the_frame_that_turns_says():
@@ -201,8 +270,11 @@ def test_friction_makes_the_whirl_unstable_where_the_frame_that_turns_says():
         assert solve_orbit(jeffcott([stop]), 12.0, guess=whirl.state).stable is stable
 
 
-def random_system(seed):
-    """Modes, a ring or a pin somewhere, and the same for the independent integration."""
+def random_system(seed, surfaces):
+    """Modes, a ring or a pin somewhere, and the same for the independent integration.
+
+    A surface of 20 m/s slides always, one slower than the whirl sticks and turns.
+    """
     rng = np.random.default_rng([64, seed])
     n = int(rng.integers(2, 5))
     half = rng.normal(size=(n, n))
@@ -214,8 +286,8 @@ def random_system(seed):
     stop = RoundStop(
         ("x", "y"), rng.uniform(2e4, 5e5) * 1e-4 ** (1.0 - p), c, p,
         tuple(0.3 * c * rng.normal(size=2)), bool(rng.random() < 0.7),
-        dissipation=float(rng.choice([0.0, 0.2])), friction=float(rng.choice([0.0, 0.2])),
-        surface_speed=float(rng.choice([-20.0, 20.0])),
+        dissipation=float(rng.choice([0.0, 0.2])), friction=float(rng.choice([0.0, 0.1, 0.3, 0.8])),
+        surface_speed=float(rng.choice(surfaces)),
     )  # fmt: skip
     w, f, share = 2.0 * np.pi * rng.uniform(5.0, 40.0), rng.uniform(2.0, 20.0), rng.random()
     system = System.from_matrices(
@@ -226,8 +298,9 @@ def random_system(seed):
         ],
     )  # fmt: skip
     ring = Ring(
-        rows, stop.stiffness, c, p, stop.eccentricity, stop.sense, stop.dissipation, stop.rub
-    )
+        rows, stop.stiffness, c, p, stop.eccentricity, stop.sense, stop.dissipation,
+        stop.friction, stop.sliding_speed,
+    )  # fmt: skip
     rotor = Rotor(
         M, C, K,
         lambda t: f * (rows[0] * (math.cos(w * t) + 0.5) + rows[1] * share * math.sin(w * t)),
@@ -241,12 +314,15 @@ def random_system(seed):
     return system, rotor, w, start, sla.block_diag(modes, modes)
 
 
-def check_against_integration(seed):
-    system, rotor, w, start, basis = random_system(seed)
+def check_against_integration(seed, surfaces):
+    """How often it closes, and how often it sticks, slips and turns."""
+    system, rotor, w, start, basis = random_system(seed, surfaces)
     flow = FlowMap(system)
     found = flow.shoot(flow.to_state(np.linalg.solve(basis, start))[None], PERIOD, w)
     assert not found.failure
-    end, columns, *_ = rotor.followed(start, 2.0 * np.pi / w, 2.0 * np.pi / w / 400, columns=True)
+    end, columns, passed, _ = rotor.followed(
+        start, 2.0 * np.pi / w, 2.0 * np.pi / w / 400, columns=True
+    )
     n = start.size // 2
     ours = basis @ flow.to_modal(found.ends[0])
     assert np.abs(ours - end)[:n].max() < 1e-8 * np.abs(end[:n]).max()
@@ -254,19 +330,30 @@ def check_against_integration(seed):
     right, left = basis @ system.linear.right, system.linear.left @ np.linalg.inv(basis)
     jacobian = right @ found.jacobians[0] @ left
     assert np.abs(jacobian - columns).max() < 1e-6 * np.abs(columns).max()
-    return int(found.closings[0])
+    return np.array([int(found.closings[0]), *turns(passed)])
+
+
+FAST, SLOW = (-20.0, 20.0), (-0.05, 0.0, 0.02)
 
 
 @pytest.mark.parametrize("seed", [2, 8])
 def test_motions_are_those_of_an_independent_integration(seed):
-    check_against_integration(seed)
+    check_against_integration(seed, FAST)
+
+
+@pytest.mark.parametrize("seed", [15, 25, 27])
+def test_motions_that_stick_and_turn_are_those_of_an_independent_integration(seed):
+    assert check_against_integration(seed, SLOW)[1:].any()
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("surfaces", [FAST, SLOW])
 @pytest.mark.parametrize("block", range(5))
-def test_random_motions_are_those_of_an_independent_integration(block):
-    hits = [check_against_integration(100 + 10 * block + k) for k in range(10)]
-    assert sum(hits) > 10
+def test_random_motions_are_those_of_an_independent_integration(block, surfaces):
+    found = [check_against_integration(100 + 10 * block + k, surfaces) for k in range(10)]
+    hits, *turned = np.sum(found, axis=0)
+    assert hits > 10
+    assert (sum(turned) > 5) is (surfaces is SLOW)
 
 
 PADS = 3e4  # N/m and rad
@@ -346,15 +433,18 @@ def test_derivatives_are_those_of_differences():
     assert by_omega == pytest.approx(found.d_omega[0], abs=1e-6 * np.abs(by_omega).max())
 
 
-def test_a_whirl_as_fast_as_the_surface_is_refused():
-    stop = RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=0.05, surface_speed=-0.05)
-    flow, w = FlowMap(jeffcott([stop])), 2.0 * np.pi * 12.0
-    start = flow.to_state(Whirl(stop, 2e-3, 12.0).state[None])
-    assert "sliding speed" in flow.shoot(start, PERIOD, w).failure
-    other = RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=0.05, surface_speed=0.05)
-    flow = FlowMap(jeffcott([other]))
-    start = flow.to_state(Whirl(other, 2e-3, 12.0).state[None])
-    assert not flow.shoot(start, PERIOD, w).failure
+def test_a_whirl_that_is_faster_than_the_surface_drags_it_along():
+    back, forth = (
+        RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=0.05, surface_speed=speed)
+        for speed in (-0.05, 0.05)
+    )
+    whirl = Whirl(forth, 2e-3, 12.0)
+    assert whirl.w * whirl.r > 0.05
+    found = [solve_orbit(jeffcott([stop]), 12.0, guess=whirl.state) for stop in (back, forth)]
+    assert found[0].point == pytest.approx(found[1].point, rel=1e-11)
+    for orbit, surface in zip(found, (-0.05, 0.05), strict=True):
+        power = 0.05 * whirl.force * (whirl.w * whirl.r + surface)
+        assert orbit.friction[0].power == pytest.approx(power, rel=1e-10)
 
 
 def test_a_drop_into_a_ring_keeps_its_energy():
@@ -635,9 +725,10 @@ def test_clearances_between_bodies_in_clearances_move_as_an_independent_integrat
     )  # fmt: skip
     first, second = np.eye(2, 4), np.eye(2, 4, 2)
     rings = [
-        Ring(rows, s.stiffness, s.clearance, 1.0, s.eccentricity, 1.0, s.dissipation, s.rub)
+        Ring(rows, s.stiffness, s.clearance, 1.0, s.eccentricity, 1.0, s.dissipation,
+             s.friction, s.sliding_speed)
         for rows, s in zip((first, second, first - second), stops, strict=True)
-    ]
+    ]  # fmt: skip
 
     def load_at(t):
         return np.array([12.0, 0.0, 6.0, 0.0]) * np.cos(w * t) + np.array(
