@@ -204,7 +204,7 @@ def _describe_round(stop: RoundStop) -> str:
     told += f", dissipation {stop.dissipation:g} s/m" if stop.dissipation else ""
     if not stop.friction:
         return told
-    surface = f"a surface at {stop.surface_speed:g} m/s" if stop.surface_speed else "what whirls"
+    surface = f"a surface at {stop.surface_speed:g} m/s" if stop.surface_speed else "no turning"
     return f"{told}, friction {stop.friction:g} of {surface}"
 
 

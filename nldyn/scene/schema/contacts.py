@@ -203,11 +203,10 @@ class RoundClearanceTable(Table):
     dissipation: NotNegative = 0.0
     """[s/m] Loss of the contact (Hunt and Crossley): it grows with the penetration, 0 or more."""
     friction: NotNegative = 0.0
-    """Coefficient of the friction along the circle; it slides one way while it touches."""
+    """Coefficient of the friction along the circle, sliding and sticking."""
     surface_speed: Number | None = None
     """[m/s] Speed of the surface that turns, ΩR of a rotor, above 0 if it turns from the first
-    direction to the second; 0 of what does not turn, and whirls from the first direction to the
-    second. Needed where there is `friction`."""
+    direction to the second; 0 of what does not turn. Needed where there is `friction`."""
 
     @model_validator(mode="after")
     def _makes_sense(self) -> RoundClearanceTable:
