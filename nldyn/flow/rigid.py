@@ -179,7 +179,8 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
             if sticks[k]
         ]
         held = np.flatnonzero(np.r_[rests[k], holds[k], np.ones(len(more), dtype=bool)])
-        pushed = np.column_stack([flow.force_columns[:, acting], *(column for _, column, _ in more)])
+        columns = flow.force_columns[:, acting]
+        pushed = np.column_stack([columns, *(column for _, column, _ in more)])
         taken = np.vstack([rows, *(row for row, _, _ in more)]) @ pushed
         for i, slider in enumerate(system.sliders):
             if slider.stop in system.rigid_stops:
