@@ -69,6 +69,8 @@ def check_massless(
         raise ReductionError(f"massless is for method 'macneal', not '{method}'")
     if isinstance(massless, str):
         raise ReductionError(f"massless must be a list of interfaces, got '{massless}'")
+    if not massless:
+        raise ReductionError("massless names no interface: without any it is method 'rubin'")
     points = {point: area for area, of in areas.items() for point in of.points}
     for name in massless:
         if name not in names:

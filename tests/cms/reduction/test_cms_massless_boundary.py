@@ -89,6 +89,7 @@ def test_how_much_is_common_to_two_is_told():
         ({"massless": ["tip"], "method": "rubin"}, "massless is for method 'macneal', not 'rubin'"),
         ({"massless": ["top"]}, "there is no interface 'top'"),
         ({"massless": ["tip", "tip"]}, "names an interface twice"),
+        ({"massless": []}, "names no interface"),
         ({"massless": "tip"}, "must be a list of interfaces, got 'tip'"),
         ({"massless": ["tip"], "modes": 40}, "nothing is left of the flexibility of 'tip'"),
         (
