@@ -9,6 +9,7 @@
 #define MANY 128      /* unknown forces at the nodes from which on they are found so */
 #define WORST_RATE 0.5 /* of convergence: a panel that takes longer is to be shorter */
 #define MOST_TURNS 60
+#define MOST_TERMS 200 /* of a series of sensitivities, which begins farther from its end */
 
 /* whether the forces of a panel are found by iteration: they are many, each a smooth law's */
 static bool is_many(const Flow *fl, const Panel *panel)
@@ -159,7 +160,7 @@ static void largest_of_columns(const double *rows, size_t count, int n_columns, 
 }
 
 /* Replace columns of forces (na, m, n_columns) in s->forces by (1 - slope G)^-1 of them: the sum of
- * what each turn adds. */
+ * what each turn adds; by no numbers if that does not end. */
 static void solve_columns(const Flow *fl, const Gauss *tab, const Panel *panel, int n_columns,
                           Scratch *s)
 {
@@ -167,7 +168,7 @@ static void solve_columns(const Flow *fl, const Gauss *tab, const Panel *panel, 
     double *most = s->part, *scale = s->part + n_columns;
     gather_stops(fl, panel, s);
     memcpy(s->added, s->forces, sizeof(double) * count);
-    for (int turn = 0; turn < MOST_TURNS; turn++) {
+    for (int term = 0; term < MOST_TERMS; term++) {
         carry_columns(fl, tab, panel, n_columns, s->added, s);
         slopes_of_columns(fl, panel, n_columns, s->added, s);
         for (size_t p = 0; p < count; p++) s->forces[p] += s->added[p];
@@ -178,4 +179,5 @@ static void solve_columns(const Flow *fl, const Gauss *tab, const Panel *panel, 
             settled = settled && most[c] <= SUM_ROUNDING * scale[c];
         if (settled) return;
     }
+    for (size_t p = 0; p < count; p++) s->forces[p] = NAN;
 }
