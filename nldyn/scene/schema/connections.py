@@ -161,6 +161,8 @@ class FrictionTable(TwoEnds):
             raise ValueError("needs an 'at_rest' of at least 'coefficient'")
         if (self.at_rest or 0.0) > self.coefficient and self.fading_speed is None:
             raise ValueError("has an 'at_rest' above 'coefficient', which needs a 'fading_speed'")
+        if self.at_rest is None and self.fading_speed is not None:
+            raise ValueError("has a 'fading_speed', which needs the 'at_rest' that fades")
         if (self.at_rest or 0.0) > self.coefficient and self.tangential_stiffness is not None:
             raise ValueError("has a 'tangential_stiffness', before which 'at_rest' is no other one")
         return self

@@ -100,6 +100,7 @@ def test_a_rigid_stop_has_friction_of_one_coefficient_without_a_spring(tmp_path)
         ({"stop = 0": "stop = 1"}, "friction of a rigid stop has one coefficient"),
         ({"stop = 0": "stop = 2"}, "no stop has that number; there are 2"),
         ({"fading_speed = 0.1": ""}, "needs a 'fading_speed'"),
+        ({"at_rest = 0.4": ""}, "needs the 'at_rest' that fades"),
         ({"at_rest = 0.4": "at_rest = 0.2"}, "'at_rest' of at least"),
         ({"0.3": "-0.3"}, "coefficient"),
         ({'"along"': '"alongside"'}, "alongside"),
