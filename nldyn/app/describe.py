@@ -235,6 +235,9 @@ def describe_slider(slider: Slider, length: str = "m") -> str:
 
     law = slider.friction
     where = f"at '{slider.at}'" + (f" against '{slider.against}'" if slider.against else "")
+    if slider.across is not None:
+        where += f", over the plane with '{slider.across[0]}'"
+        where += f" against '{slider.across[1]}'" if slider.across[1] else ""
     told = f"friction {where}: coefficient {law.coefficient:.6g}"
     told += f", at rest {law.at_rest:.6g}" if law.adhesion else ""
     told += f", base at {law.base_speed:.6g} {length}/s" if law.base_speed else ""

@@ -12,6 +12,7 @@
 #include "flights.c"
 #include "resolution.c"
 #include "round_panel.c"
+#include "friction_disc.c"
 #include "panel.c"
 #include "many.c"
 #include "panel_end.c"

@@ -96,17 +96,21 @@ typedef struct {
     double tangential;  /* of a slider behind a spring: its stiffness */
     double place;       /* entry of the state that is the slider's own place, or -1 */
     double place_rate;  /* rate of that entry where it sticks */
+    double beside;      /* of a slider over a plane: row of its other tangent, or -1 */
+    double mover;       /* of both: row of the speed of its place */
+    double moves;       /* of that: row of the slider whose place it moves, or -1 */
 } Stop;
 
 enum Column {
     GAP, STIFFNESS, EXPONENT, DISSIPATION, DASHPOT, MOBILITY, DURATION, INSTANT, RESTITUTION, BOND,
     DRAG, CUBIC, RELEASE, FRICTION, ADHESION, FADING, BELT, NORMAL, PRESSING,
     SECOND, LEAD, CENTRE, SENSE, RUB, SURFACE, AREA, SHARE, TANGENTIAL,
-    PLACE, PLACE_RATE, FIRST_POWER
+    PLACE, PLACE_RATE, BESIDE, MOVER, MOVES, FIRST_POWER
 };
 
 /* A system. Outputs are the penetrations of the stops, the displacements of sliders and bonds and
- * those along the second directions of round clearances, then the observed displacements. */
+ * those along the second directions of round clearances and of sliders over a plane, then those of
+ * the movers of these, which are the same again, then the observed displacements. */
 typedef struct {
     int64_t n, n_out, n_stops, n_columns, n_orders;
     const double *blocks; /* (n, 2, 2) */
@@ -115,7 +119,7 @@ typedef struct {
     const double *force;  /* (2n, n_stops): w' = A w - force F */
     const double *orders; /* (h,) multiples of the excitation frequency; 1 first */
     const Complex *drive; /* (h, 3, 2n) excitation Σ Re(Σ_p ω^p drive[h, p] e^{i orders[h] ωt}) */
-    const double *stops;  /* (n_stops, n_columns): stops, sliders, bonds, seconds */
+    const double *stops;  /* (n_stops, n_columns): stops, sliders, bonds, seconds, movers */
     const int64_t *laws;  /* (n_stops,) address of a law (of a rigid stop's restitution), or 0 */
     double tail;          /* largest relative Legendre tail accepted on a contact panel */
     double node_angle;    /* phase of the fastest mode from node to node, in rad */
@@ -206,6 +210,9 @@ typedef struct {
                        * round clearances, (outputs, m) that by the output of the other direction */
     bool round;       /* whether there are any */
     double *radial;   /* (na, m) their penetrations, at the place of the first direction */
+    double *tilt;     /* (na, 5, m) derivatives of what slides over a plane, see `tilt_of` */
+    bool rough;       /* whether their turning is not yet led by the normal force: far from it */
+    double *growth;   /* (na,) rate of the length of its strain, at the place of its first row */
     double *there;    /* (n, 4, m) exp(A t_i) */
     double *home;     /* (n, 4, m) exp(-A t_j) */
     double *to;       /* (outputs, 2n, m) row exp(A t_i) */

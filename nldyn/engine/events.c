@@ -101,6 +101,30 @@ static double hold_noise(const Flow *fl, int s, const double *w)
     return noise / smaller(mobility, stop_of(fl, lead)->mobility);
 }
 
+/* the same as `show_slider` over a plane; where it sticks, the margin is smooth without force, too */
+static void show_disc(const Flow *fl, const Panel *panel, int position, double *values)
+{
+    int na = panel->na, m = panel->m, s = panel->active[position];
+    int places[2] = {position, place_of(panel, (int)stop_of(fl, s)->beside)};
+    double most = TINY;
+    for (int i = 0; i < m; i++) {
+        double force = hypot(panel->F[places[0] * m + i], panel->F[places[1] * m + i]);
+        double held = grip(fl, s) * normal_at(fl, panel, s, i);
+        most = larger(most, larger(force, held));
+        values[i] = 0.5 * (held - force) * (held + force);
+    }
+    for (int i = 0; i < m && fl->slides[s] == 0; i++) values[i] /= most;
+    for (int i = 0; i < m && fl->slides[s] != 0; i++) {
+        double size = TINY, along = 0.0;
+        for (int d = 0; d < 2; d++) {
+            double strain = panel->output[places[d] * m + i];
+            size = hypot(size, strain);
+            along += strain * panel->output[(na + places[d]) * m + i];
+        }
+        values[i] = along / size - grip_pace(fl, panel, s, i);
+    }
+}
+
 /* fill values (m,) at the nodes of a panel, positive as long as a slider at a place among the
  * closed ones slides on, or sticks without more force than its friction to one `side` */
 static void show_slider(const Flow *fl, const Panel *panel, int position, int side, double *values)
@@ -108,6 +132,10 @@ static void show_slider(const Flow *fl, const Panel *panel, int position, int si
     int m = panel->m, s = panel->active[position];
     if (is_second(fl, s)) {
         show_rubbing(fl, panel, s, side, values);
+        return;
+    }
+    if (is_disc(fl, s)) {
+        show_disc(fl, panel, position, values);
         return;
     }
     for (int i = 0; i < m; i++)
@@ -151,6 +179,14 @@ static double time_to_slip(const Motion *M, int s, int kind, double end_phase, d
     return slope < 0.0 ? -*value / slope : INFINITY;
 }
 
+/* size of a slider's acceleration in flight */
+static double push_along(const Flow *fl, int s, const double *w, double phase)
+{
+    double push = output_now(fl, s, w, phase).second;
+    if (!is_disc(fl, s)) return fabs(push);
+    return hypot(push, output_now(fl, (int)stop_of(fl, s)->beside, w, phase).second);
+}
+
 /* whether a stop is just about to switch, to within a time allowed or rounding: of the state, and of
  * the time, since an instant is known no better than its phase */
 static bool at_switch(const Flow *fl, int stop, const double *w, double phase, double allowed,
@@ -160,7 +196,8 @@ static bool at_switch(const Flow *fl, int stop, const double *w, double phase, d
     int out = watched(fl, stop, closed, w, phase);
     if (is_strained(fl, stop)) return at_grip(fl, stop, w, phase, allowed);
     if (rubs(fl, stop)) { /* where it sticks, the state does not tell */
-        double pace = is_second(fl, stop) ? round_slip(fl, stop, w, phase).first : at.second;
+        double pace = is_second(fl, stop) ? round_slip(fl, stop, w, phase).first
+                                          : push_along(fl, stop, w, phase);
         return fabs(slip(fl, stop, w, phase)) <=
                allowed * fabs(pace) + 10.0 * slip_noise(fl, stop, w, phase);
     }
@@ -206,7 +243,7 @@ static int stop_at_switch(const Flow *fl, const double *w, double phase, double 
     double nearest = INFINITY;
     double allowed = 10.0 * (coarsest_instant(fl) * h + SUM_ROUNDING * phase / fl->omega);
     for (int s = 0; s < fl->n_stops; s++) {
-        if (is_bond(fl, s) || is_slider(fl, s) || is_second(fl, s)) continue;
+        if (is_bond(fl, s) || is_slider(fl, s) || is_second(fl, s) || is_mover(fl, s)) continue;
         if (is_rigid(fl, s) && closed[s]) continue;
         double late = fabs(time_to_event(fl, s, closed, w, phase));
         double gap = watched_pace(fl, s, closed, w, phase).value;
@@ -240,6 +277,12 @@ static double graded_length(const Flow *fl, const Panel *panel, const double *w,
             double growth = -stop_of(fl, s)->mobility * sliding_law(fl, s, speed, normal).viscosity;
             bool hidden = GROWTH < growth * HIDDEN_GROWTH * h;
             if (growth > 0.0 && !hidden) longest = smaller(longest, GROWTH / growth);
+        }
+        bool turns = disc_of(fl, panel, a) == s && panel->growth[a] == 0.0;
+        if (sign > 0.0 && turns && panel->decayed[a] <= FADED) {
+            Disc at = disc_now(fl, s, w, phase);
+            if (at.size > 0.0 && at.along > 0.0)
+                longest = smaller(longest, 0.5 * DECAY * at.size / at.along);
         }
         if (s == event || !singular_slope(fl, s)) continue;
         Course at = depth_now(fl, s, w, phase);
@@ -427,7 +470,8 @@ static Event first_event(const Motion *M, int kind, double phase, double h)
     if (M->panel->na < fl->n_stops) drive_back(fl, M->tab, M->w, M->panel, M->s);
     for (int stop = 0; stop < fl->n_stops; stop++) {
         if (M->closed[stop]) position++; /* a bond is always closed */
-        if (is_bond(fl, stop) || (is_second(fl, stop) && !rubs_around(fl, stop))) continue;
+        if (is_bond(fl, stop) || is_mover(fl, stop) || is_mate(fl, stop)) continue;
+        if (is_second(fl, stop) && !rubs_around(fl, stop)) continue;
         if (rubs(fl, stop) && (!M->closed[stop] || slides_freely(fl, stop))) continue;
         if (is_rigid(fl, stop) && !M->closed[stop] && held_open(M, stop)) continue;
         if (!rubs(fl, stop)) {
@@ -437,7 +481,7 @@ static Event first_event(const Motion *M, int kind, double phase, double h)
             continue;
         }
         for (int side = -1; side <= 1; side += 2) /* what slides has one only */
-            if (fl->slides[stop] == 0 || side == 1)
+            if ((fl->slides[stop] == 0 && !is_disc(fl, stop)) || side == 1)
                 find_event(M, kind, phase, h, stop, show_friction(M, phase, h, stop, position, side),
                            &found);
     }

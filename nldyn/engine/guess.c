@@ -189,8 +189,12 @@ static void guess_outputs(const Flow *fl, const Gauss *tab, double phase, const 
     int m = panel->m, stop = panel->active[a];
     double *delta = panel->output + (size_t)a * m;
     if (is_second(fl, stop)) return; /* with the first direction */
-    if (is_bond(fl, stop) || (is_slider(fl, stop) && !is_held(fl, stop))) {
+    if (is_bond(fl, stop) || is_mover(fl, stop) || (is_slider(fl, stop) && !is_held(fl, stop))) {
         hold_still(fl, phase, w, a, panel);
+        int disc = disc_of(fl, panel, a);
+        double pace = output_now(fl, stop, w, phase).first * choice.length;
+        if (disc >= 0 && panel->growth[place_of(panel, disc)] > 0.0)
+            for (int i = 0; i < panel->m; i++) delta[i] = pace * tab->chi[choice.kind * panel->m + i];
         return;
     }
     if (is_held(fl, stop)) {

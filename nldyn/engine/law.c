@@ -71,9 +71,21 @@ static bool is_stuck(const Motion *M, int s)
     return M->closed[s] && (sticks_around(M->fl, s) || (is_slider(M->fl, s) && is_held(M->fl, s)));
 }
 
+/* whether a slider slides over a plane, and whether it is the second row of one that does */
+static bool is_disc(const Flow *fl, int s) { return stop_of(fl, s)->beside >= 0.0; }
+
+static bool is_mate(const Flow *fl, int s)
+{
+    return is_disc(fl, s) && (int)stop_of(fl, s)->beside < s;
+}
+
+/* whether a row is the speed of a slider's place */
+static bool is_mover(const Flow *fl, int s) { return stop_of(fl, s)->moves >= 0.0; }
+
 static bool is_elastic(const Flow *fl, int s)
 {
-    return !(is_rigid(fl, s) || is_slider(fl, s) || is_bond(fl, s) || is_second(fl, s));
+    return !(is_rigid(fl, s) || is_slider(fl, s) || is_bond(fl, s) || is_second(fl, s) ||
+             is_mover(fl, s));
 }
 
 /* whether a stop presses a slider on, in place of a constant force */
@@ -146,6 +158,7 @@ static Force law(const Flow *fl, int s, double delta, double speed)
 {
     const Stop *stop = stop_of(fl, s);
     Force none = {0.0, 0.0, 0.0};
+    if (is_mover(fl, s)) return none; /* see `disc_law` */
     if (is_bond(fl, s)) return bond_law(fl, s, delta, speed);
     if (is_strained(fl, s))
         return (Force){stop->tangential * delta, stop->tangential, 0.0};
@@ -163,7 +176,7 @@ static Force closed_law(const Flow *fl, int s, double delta, double speed)
 {
     const Stop *stop = stop_of(fl, s);
     if (is_held(fl, s)) return (Force){delta / stop->mobility, 1.0 / stop->mobility, 0.0};
-    if (is_bond(fl, s) || is_slider(fl, s)) return law(fl, s, delta, speed);
+    if (is_bond(fl, s) || is_slider(fl, s) || is_mover(fl, s)) return law(fl, s, delta, speed);
     if (delta > 0.0) return pressing_law(fl, s, delta, speed);
     double dashpot = stop->dashpot;
     if (stop->exponent < ROUND) {
@@ -218,6 +231,7 @@ static bool depends_on_speed(const Flow *fl, int s)
 static bool is_number_of(const Flow *fl, int c, int s)
 {
     int64_t column = fl->parameters[2 * c], index = fl->parameters[2 * c + 1];
+    if (is_mate(fl, s)) s = (int)stop_of(fl, s)->beside;
     if (index >= -1) return index == s;
     return (int64_t)stop_of(fl, s)->area == -2 - index && is_slider(fl, s) == (column == FRICTION);
 }

@@ -58,6 +58,9 @@ class StopRow(NamedTuple):
     tangential: float = 0.0  # of a slider behind a spring: its stiffness
     place: float = -1.0  # entry of the state that is the slider's own place, or -1
     place_rate: float = 0.0  # rate of that entry where it sticks
+    beside: float = -1.0  # of a slider over a plane: row of its other tangent, or -1
+    mover: float = -1.0  # of both: row of the speed of its place
+    moves: float = -1.0  # of that: row of the slider whose place it moves, or -1
 
 
 FIRST_POWER = len(
@@ -69,7 +72,8 @@ class SystemData(NamedTuple):
     """Numbers of a system, as the engine needs them.
 
     Outputs are the penetrations of the stops, the displacements of sliders and bonds and those
-    along the second directions of round clearances, then the observed displacements.
+    along the second directions of round clearances and of sliders over a plane, then those of the
+    movers of these, which are the same again, then the observed displacements.
     """
 
     blocks: Real  # (n, 2, 2)

@@ -16,7 +16,9 @@ static bool is_many(const Flow *fl, const Panel *panel)
 {
     if (panel->na * panel->m < MANY || panel->round) return false;
     for (int a = 0; a < panel->na; a++)
-        if (is_held(fl, panel->active[a]) || is_bond(fl, panel->active[a])) return false;
+        if (is_held(fl, panel->active[a]) || is_bond(fl, panel->active[a]) ||
+            is_mover(fl, panel->active[a]))
+            return false;
     return true;
 }
 

@@ -14,6 +14,7 @@
 #define SLOWEST 1e-3  /* 1 - rate of its convergence, at least, in the estimate of that */
 #define LARGEST_ANGLE 1e5 /* that `fill_sines` is left to */
 #define ALONG 1e-9   /* of the cosine squared: a slider that moves as a stop does */
+#define ROUGH 3       /* steps in which the turning of friction over a plane is not led by forces */
 #define STALE 0.1     /* rate from which its matrix is inverted anew */
 
 static bool is_many(const Flow *fl, const Panel *panel);
@@ -215,14 +216,8 @@ static void free_outputs(const Flow *fl, const Gauss *tab, int kind, double phas
 static int pressing_place(const Flow *fl, const Panel *panel, int a)
 {
     int s = panel->active[a];
+    if (is_disc(fl, s)) return -1; /* see `add_disc_friction` */
     return is_pressed(fl, s) && fl->slides[s] != 0 ? place_of(panel, (int)stop_of(fl, s)->normal) : -1;
-}
-
-/* force that presses a slider on, at node i of a panel */
-static double normal_at(const Flow *fl, const Panel *panel, int s, int i)
-{
-    if (!is_pressed(fl, s)) return stop_of(fl, s)->pressing;
-    return panel->F[place_of(panel, (int)stop_of(fl, s)->normal) * panel->m + i];
 }
 
 /* add to rows of sliders what they have of the rows of the stops that press them on, in a matrix
@@ -233,6 +228,7 @@ static void add_friction(const Flow *fl, const Panel *panel, double *matrix, int
 {
     int na = panel->na, m = panel->m;
     for (int a = 0; a < na; a++) {
+        add_disc_friction(fl, panel, a, matrix, n_columns, entry, row);
         int normal = pressing_place(fl, panel, a);
         for (int i = 0; i < m && normal >= 0; i++) {
             double share = friction_at(fl, panel->active[a], panel->output[(na + a) * m + i]).value;
@@ -266,6 +262,7 @@ static void panel_forces(const Flow *fl, Panel *panel, double *slope)
             panel->F[a * m + i] = f.force;
             slope[(na + a) * m + i] = f.viscosity;
         }
+        if (disc_of(fl, panel, a) == panel->active[a]) disc_forces(fl, panel, a, slope);
     }
 }
 
@@ -287,9 +284,11 @@ static void invert_panel(const Flow *fl, Panel *panel)
             for (int p = 0; p < width; p++) column[p] -= slope[more + p] * G[more + p];
         for (int p = width; p < pad; p++) column[p] = 0.0;
     }
-    for (int o = 0; o < panel->outputs; o++)
-        add_crossed(fl, panel, o, -1.0, panel->G + o * panel->m, height, 1, panel->inverse, pad, 1,
-                    width);
+    for (int o = 0; o < panel->outputs; o++) {
+        const double *G = panel->G + o * panel->m;
+        add_crossed(fl, panel, o, -1.0, G, height, 1, panel->inverse, pad, 1, width);
+        add_tilted(fl, panel, o, -1.0, G, height, 1, panel->inverse, pad, 1, width);
+    }
     add_friction(fl, panel, panel->inverse, width, pad, 1);
     for (int q = 0; q < width; q++) panel->inverse[(size_t)q * pad + q] += 1.0;
     invert(panel->inverse, width, panel->order);
@@ -354,6 +353,7 @@ static bool consistent(const Flow *fl, const Panel *panel, const double *force,
         for (int o = normal; o >= 0 && o < panel->outputs; o += na)
             allowed += 10.0 * grip(fl, panel->active[a]) * noise[o] *
                        largest(panel->slope + (size_t)o * m, m);
+        allowed += disc_noise(fl, panel, a, noise);
         for (int i = 0; i < m; i++) {
             double off = fabs(panel->F[a * m + i] - force[a * m + i]);
             if (off > allowed && off > allowed + rounded_force(fl, panel, force, a, i)) return false;
@@ -382,8 +382,10 @@ static void step_forces(const Flow *fl, Panel *panel, Scratch *s, int iteration)
                 s->led[place] -= panel->output[place];
                 s->step[p] += panel->slope[place] * s->led[place];
             }
-        for (int o = 0; o < panel->outputs; o++)
+        for (int o = 0; o < panel->outputs; o++) {
             add_crossed(fl, panel, o, 1.0, s->led + o * panel->m, 0, 1, s->step, 0, 1, 1);
+            add_tilted(fl, panel, o, 1.0, s->led + o * panel->m, 0, 1, s->step, 0, 1, 1);
+        }
         add_friction(fl, panel, s->step, 1, 1, 1);
     }
     combine(s->led, s->solved, width, panel->inverse, padded(width), s->step, 1, width);
@@ -429,10 +431,14 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
     panel_responses(fl, tab, kind, h, panel, s);
     free_outputs(fl, tab, kind, phase, w, h, panel, s);
     if (many) return solve_many(fl, tab, noise, panel, s);
+    panel->rough = true;
     if (panel->outputs > panel->na) guess_rates(fl, panel, s);
+    bool discs = any_disc(fl, panel);
     double before = INFINITY;
     for (int iteration = 0; iteration < 60; iteration++) {
         if (iteration % 8 == 7 && interrupted(fl->watch)) break; /* a step of 40 stops takes long */
+        panel->rough = discs && iteration < ROUGH;
+        if (discs && iteration <= ROUGH) panel->kept = false;
         panel_forces(fl, panel, s->new_slope);
         bool fresh = !panel->kept;
         if (fresh) {
@@ -448,7 +454,7 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
          * nothing moves where forces are too weak to: they may still not be the penetrations' */
         double rate = change > 0.0 ? change / before : 0.0;
         double left = fresh ? change * change : change * rate / larger(1.0 - rate, SLOWEST);
-        if (left <= SOLVED && (fresh || before < INFINITY || change == 0.0)) {
+        if (left <= SOLVED && !panel->rough && (fresh || before < INFINITY || change == 0.0)) {
             panel_forces(fl, panel, panel->slope);
             if (consistent(fl, panel, s->solved, noise)) return true;
             rate = 1.0; /* that estimate trusts in the order of convergence */

@@ -34,7 +34,8 @@ static void hold_speeds(const Flow *fl, const Gauss *tab, int kind, double end_p
     if (largest(panel->decay, na) <= DECAY) return;
     for (int a = 0; a < na; a++) {
         s->viscosity[a] = s->off[a] = 0.0;
-        if (!(panel->decay[a] > DECAY) || is_planar(fl, panel->active[a])) continue;
+        bool turns = is_planar(fl, panel->active[a]) || is_disc(fl, panel->active[a]);
+        if (!(panel->decay[a] > DECAY) || turns) continue;
         double speed = output_now(fl, panel->active[a], w_end, end_phase).first, gained = 0.0;
         s->viscosity[a] = law(fl, panel->active[a], panel->end_depth[a], speed).viscosity;
         for (int i = 0; i < m; i++)
@@ -119,6 +120,18 @@ static void add_node_columns(const Flow *fl, double node_phase, double t, const 
     double *forces = s->forces + (size_t)((o % na) * m + i) * n_columns;
     int order = output_order(fl, stop, o / na);
     add_forced_by(fl, stop, order, node_phase, t, panel->slope[o * m + i], forces, n_columns);
+    int disc = disc_of(fl, panel, o % na);
+    if (disc >= 0) {
+        int places[4];
+        if (is_mover(fl, stop)) return;
+        disc_places(fl, panel, disc, places);
+        for (int f = 0; f < 4; f++)
+            add_forced_by(fl, stop, order, node_phase, t,
+                          tilt_of(panel, places[f], tilt_by(fl, panel, o))[i],
+                          s->forces + (size_t)(places[f] * m + i) * n_columns, n_columns);
+        if (stop == disc && order == 0) add_disc_columns(fl, panel, o, i, n_columns, s->forces);
+        return;
+    }
     if (is_planar(fl, stop)) {
         if (is_round(fl, stop) && order == 0) add_round_columns(fl, panel, o, i, n_columns, s->forces);
         int partner = partner_of(fl, panel, o % na);
@@ -164,6 +177,7 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
             add_node_columns(fl, phase + fl->omega * t, t0 + t, panel, o, i, n_columns, s);
         }
         add_crossed(fl, panel, o, 1.0, s->part, 1, n_columns, s->forces, 1, n_columns, n_columns);
+        add_tilted(fl, panel, o, 1.0, s->part, 1, n_columns, s->forces, 1, n_columns, n_columns);
     }
     add_friction(fl, panel, s->forces, n_columns, 1, n_columns);
     if (panel->many)

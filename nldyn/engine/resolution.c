@@ -7,6 +7,12 @@
 #define CLEAR 0.1  /* of the largest: a lowest value above it is not near zero in between either */
 #define PLACED 1e-6 /* relative: error of the place where a panel is to be cut */
 
+static int disc_of(const Flow *fl, const Panel *panel, int a);
+static double show_disc_force(const Flow *fl, const Panel *panel, int a, double *shown);
+static double disc_kick(const Flow *fl, const Panel *panel, int a, double h);
+static double forgotten(const Flow *fl, const Gauss *tab, int kind, double h, const Panel *panel,
+                        int a);
+
 /* Legendre coefficient of the polynomial through values (m,) */
 static inline double legendre_coefficient(const Gauss *tab, const double *values, int degree)
 {
@@ -183,10 +189,16 @@ static bool output_resolved(const Flow *fl, const Gauss *tab, int kind, double h
     const double *F = panel->F + (size_t)a * m;
     const double *depths = (is_round(fl, closed) ? panel->radial : panel->output) + (size_t)a * m;
     double deepest = deepest_of(fl, panel, a), strongest = largest_of(fl, panel, panel->F, a);
+    if (disc_of(fl, panel, a) >= 0) {
+        strongest = show_disc_force(fl, panel, a, s->inner);
+        F = s->inner;
+        double share = legendre_tail(tab, F) / larger(strongest, TINY);
+        if (kind != 0 && share * disc_kick(fl, panel, a, h) <= squared(fl->tail)) return true;
+    }
     if (deepest <= 10.0 * noise[a]) return true;
     if (o < na && singular_slope(fl, closed) && nearly_opens(tab, kind, depths, 10.0 * noise[a]))
         return false;
-    double goal = panel->decay[a] <= DECAY ? fl->tail : DAMPED_TAIL * fl->tail; /* hold_speeds */
+    double goal = panel->decay[a] <= DECAY || is_disc(fl, closed) ? fl->tail : DAMPED_TAIL * fl->tail; /* hold_speeds */
     if (1.0 < stop->exponent && stop->exponent < ROUND) goal *= SHARP_TAIL;
     if (is_held(fl, closed) || holds_around(fl, closed)) goal *= REST_TAIL;
     double floor = BLIND * noise[a] / deepest;
@@ -241,6 +253,8 @@ static bool shows_decay(const Flow *fl, const Gauss *tab, int kind, double h, Pa
         double total = 0.0, mobility = stop_of(fl, panel->active[a])->mobility;
         for (int i = 0; i < m; i++)
             total += h * tab->weights[kind * m + i] * (mobility * panel->slope[o * m + i]);
+        if (disc_of(fl, panel, a) == panel->active[a])
+            total = panel->growth[a] > 0.0 ? 0.0 : forgotten(fl, tab, kind, h, panel, a);
         panel->decay[a] = total;
         bool faded = panel->decayed[a] > FADED && !is_planar(fl, panel->active[a]);
         shown = shown && (total <= DECAY || faded);

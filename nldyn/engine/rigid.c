@@ -166,6 +166,11 @@ static void contact_forces(const Motion *M, double phase)
         forces[s] = M->closed[s] ? force_now(fl, s, M->w, phase) : 0.0;
         if (M->closed[s] && is_pressed(fl, s) && !is_strained(fl, s)) /* after what presses it on */
             forces[s] = sliding_law(fl, s, at.first, forces[(int)stop_of(fl, s)->normal]).force;
+        if (M->closed[s] && slides_on_disc(fl, s)) {
+            int first = is_mate(fl, s) ? (int)stop_of(fl, s)->beside : s;
+            double u = disc_now(fl, first, M->w, phase).u[s != first];
+            forces[s] = u * grip(fl, s) * pressing_now(fl, s, M->w, phase).value;
+        }
     }
     for (int b = 0; b < n; b++)
         if (forces[b] != 0.0)
@@ -516,11 +521,12 @@ static void slide_or_stick(Motion *M, int s, double phase, double t)
     contact_forces(M, phase);
     M->panel->na = -1;
     if (is_sprung(fl, s) && fl->slides[s] != 0) { /* no force jumps */
-        fl->slides[s] = 0;
+        set_slides(fl, s, 0);
         return;
     }
     if (fl->slides[s] == 0) {
         fl->slides[s] = held_force(M, s) > 0.0 ? 1 : -1;
+        if (is_disc(fl, s)) set_slides(fl, s, 1);
         return;
     }
     double pace = held_pace(M, s, M->s->pushes, phase);

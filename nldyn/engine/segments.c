@@ -119,7 +119,7 @@ static int fly(Motion *M, double here)
     double first = M->duration - M->t;
     int stop = -1;
     for (int s = 0; s < fl->n_stops; s++) {
-        if (is_slider(fl, s) || is_second(fl, s)) continue; /* nothing presses it on */
+        if (is_slider(fl, s) || is_second(fl, s) || is_mover(fl, s)) continue; /* not pressed */
         double at = closing_time(fl, s, M->w, here, M->skips[s], first, M->shortest);
         if (at < 0.0) return fl->watch->stopped ? INTERRUPTED : TOO_MANY_STEPS;
         if (at < first) {
@@ -170,6 +170,16 @@ static void carry_depths(Motion *M, double here)
         panel->depth[a] = M->depth[stop];
         panel->doubt[a] = M->doubt[stop];
     }
+    for (int a = 0; a < panel->na; a++) { /* a strain that is none may grow at any rate */
+        int s = panel->active[a];
+        panel->growth[a] = 0.0;
+        if (disc_of(M->fl, panel, a) != s) continue;
+        int other = place_of(panel, (int)stop_of(M->fl, s)->beside);
+        Disc at = disc_now(M->fl, s, M->w, here);
+        if (at.size > 0.0) continue;
+        panel->depth[a] = panel->depth[other] = 0.0;
+        panel->growth[a] = hypot(at.speed[0], at.speed[1]);
+    }
 }
 
 /* whether all numbers of the state at the end of a panel are finite */
@@ -191,7 +201,7 @@ static int take_panel(Motion *M, double here, const Trial *trial)
     for (int a = 0; a < panel->na; a++) {
         if (HALF_ULP * panel->decay[a] > WORST_ROUNDING) return ROUNDED;
         panel->decayed[a] += panel->decay[a];
-        if (panel->decay[a] > DECAY)
+        if (panel->decay[a] > DECAY && !is_disc(fl, panel->active[a]))
             M->last_push[panel->active[a]] = at_end(M->tab, panel->F + (size_t)a * panel->m);
     }
     if (M->with_columns)
@@ -267,6 +277,13 @@ static void begin_pieces(Motion *M, double fastest)
     }
 }
 
+/* whether the place of a slider over a plane moves by itself */
+static bool moves_now(const Motion *M, int s)
+{
+    int slider = (int)stop_of(M->fl, s)->moves;
+    return M->closed[slider] && M->fl->slides[slider] != 0;
+}
+
 /* advance w and its sensitivities in place over a segment, piece by piece */
 static int run_pieces(Motion *M)
 {
@@ -279,6 +296,7 @@ static int run_pieces(Motion *M)
         int na = 0;
         for (int s = 0; s < fl->n_stops; s++) {
             M->last_push[s] = NAN;
+            if (is_mover(fl, s)) M->closed[s] = moves_now(M, s);
             if (M->closed[s])
                 M->active[na++] = s;
             else

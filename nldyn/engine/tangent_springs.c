@@ -20,12 +20,43 @@ static Value pressing_now(const Flow *fl, int s, const double *w, double phase)
     return (Value){f.force, touches ? stop_of(fl, stop)->stiffness : f.stiffness};
 }
 
+/* a slider over a plane at present */
+typedef struct {
+    double strain[2], speed[2], u[2]; /* u: direction of the strain or, without any, of the speed */
+    double size;                      /* length of the strain, zero where it is rounding */
+    double along;                     /* speed along u at which the slider slides */
+} Disc;
+
+static Disc disc_now(const Flow *fl, int s, const double *w, double phase)
+{
+    const Stop *slider = stop_of(fl, s);
+    Disc at;
+    for (int d = 0; d < 2; d++) {
+        Course strain = output_now(fl, d == 0 ? s : (int)slider->beside, w, phase);
+        at.strain[d] = strain.value;
+        at.speed[d] = strain.first;
+    }
+    at.size = hypot(at.strain[0], at.strain[1]);
+    double noise = output_noise(fl, s, w) + output_noise(fl, (int)slider->beside, w);
+    bool strained = at.size > 10.0 * noise;
+    if (!strained) at.size = 0.0;
+    double length = strained ? at.size : hypot(at.speed[0], at.speed[1]);
+    for (int d = 0; d < 2; d++)
+        at.u[d] = (strained ? at.strain[d] : at.speed[d]) / larger(length, TINY);
+    at.along = at.u[0] * at.speed[0] + at.u[1] * at.speed[1];
+    if (!is_pressed(fl, s)) return at;
+    double pace = depth_now(fl, (int)slider->normal, w, phase).first;
+    at.along -= grip(fl, s) * pressing_now(fl, s, w, phase).slope * pace / slider->tangential;
+    return at;
+}
+
 /* Speed at which a slider moves along what it slides on, to one `way`: of what it holds or, behind
  * a spring, less the rate of the strain, that of its friction over the stiffness. */
 static double drag_speed(const Flow *fl, int s, int way, const double *w, double phase)
 {
     const Stop *slider = stop_of(fl, s);
     double speed = output_now(fl, s, w, phase).first - slider->belt;
+    if (is_disc(fl, s) && way != 0) return disc_now(fl, s, w, phase).along;
     if (!is_sprung(fl, s) || !is_pressed(fl, s) || way == 0) return speed;
     double pace = depth_now(fl, (int)slider->normal, w, phase).first;
     double growth = pressing_now(fl, s, w, phase).slope * pace;
@@ -37,6 +68,13 @@ static double drag_noise(const Flow *fl, int s, const double *w, double phase)
 {
     const Stop *slider = stop_of(fl, s);
     double noise = rate_noise(fl, s, w);
+    if (is_disc(fl, s)) {
+        int other = (int)slider->beside;
+        Disc at = disc_now(fl, s, w, phase);
+        double turn = at.size > 0.0 ? hypot(at.speed[0], at.speed[1]) / at.size : 0.0;
+        noise += rate_noise(fl, other, w);
+        noise += turn * (output_noise(fl, s, w) + output_noise(fl, other, w));
+    }
     if (!is_sprung(fl, s) || !is_pressed(fl, s)) return noise;
     int stop = (int)slider->normal;
     Course at = depth_now(fl, stop, w, phase);
@@ -65,6 +103,11 @@ static void fill_drags(const Motion *M, double phase)
         bool sticks = M->closed[s] && fl->slides[s] == 0;
         int way = M->closed[s] ? fl->slides[s] : 0;
         double speed = sticks ? 0.0 : drag_speed(fl, s, way, M->w, phase);
+        if (way != 0 && is_disc(fl, s)) {
+            int first = is_mate(fl, s) ? (int)stop_of(fl, s)->beside : s;
+            Disc at = disc_now(fl, first, M->w, phase);
+            speed = at.along * at.u[s != first];
+        }
         M->s->drags[s] = -speed / strain_by_place(fl, s);
     }
 }
@@ -73,7 +116,9 @@ static void fill_drags(const Motion *M, double phase)
 static double strain_noise(const Flow *fl, int s, const double *w)
 {
     const Stop *slider = stop_of(fl, s);
-    return slider->tangential * output_noise(fl, s, w);
+    double noise = output_noise(fl, s, w);
+    if (is_disc(fl, s)) noise += output_noise(fl, (int)slider->beside, w);
+    return slider->tangential * noise;
 }
 
 /* whether a slider that sticks is about to slip, to within a time allowed or rounding */
@@ -82,6 +127,11 @@ static bool at_grip(const Flow *fl, int s, const double *w, double phase, double
     const Stop *slider = stop_of(fl, s);
     Course strain = output_now(fl, s, w, phase);
     double most = grip(fl, s) * pressing_now(fl, s, w, phase).value;
+    if (is_disc(fl, s)) {
+        Disc at = disc_now(fl, s, w, phase);
+        strain.value = at.size;
+        strain.first = hypot(at.speed[0], at.speed[1]);
+    }
     double margin = most - fabs(slider->tangential * strain.value);
     double pace = slider->tangential * fabs(strain.first);
     if (is_pressed(fl, s)) {
@@ -149,14 +199,74 @@ static void drag_place(Motion *M, int s, int way, double phase, double t)
     M->doubt[s] = 0.0;
 }
 
+/* The same over a plane: the strain keeps its direction, at the length of its friction over the
+ * stiffness. */
+static void drag_over_plane(Motion *M, int s, double phase, double t)
+{
+    const Flow *fl = M->fl;
+    const Stop *slider = stop_of(fl, s);
+    int rows[2] = {s, (int)slider->beside}, n = M->n_columns;
+    Disc at = disc_now(fl, s, M->w, phase);
+    double share = grip(fl, s) / slider->tangential;
+    double normal = larger(pressing_now(fl, s, M->w, phase).value, 0.0), aim = share * normal;
+    if (!(aim > 0.0 && at.size > 0.0)) {
+        for (int d = 0; d < 2; d++) drag_place(M, rows[d], 0, phase, t);
+        return;
+    }
+    double *off[2] = {M->s->closing, M->s->sliding}, *grown = M->s->along_columns;
+    for (int d = 0; d < 2 && M->with_columns; d++)
+        output_columns(fl, rows[d], 0, phase, t, M->columns, n, off[d]);
+    for (int c = 0; c < n && M->with_columns; c++) grown[c] = 0.0;
+    if (M->with_columns) add_pressing_columns(M, s, share, phase, t, grown);
+    for (int c = 0; c < fl->n_parameters && M->with_columns; c++) {
+        if (is_parameter(fl, c, FRICTION, s)) grown[fl->size + c] += normal / slider->tangential;
+        if (is_parameter(fl, c, TANGENTIAL, s)) grown[fl->size + c] -= aim / slider->tangential;
+    }
+    for (int c = 0; c < n && M->with_columns; c++) {
+        double aside = at.u[0] * off[1][c] - at.u[1] * off[0][c], turned_by = aim / at.size * aside;
+        off[0][c] = at.u[0] * grown[c] - at.u[1] * turned_by - off[0][c];
+        off[1][c] = at.u[1] * grown[c] + at.u[0] * turned_by - off[1][c];
+    }
+    for (int d = 0; d < 2; d++) {
+        double by = strain_by_place(fl, rows[d]);
+        double *row = M->columns + (size_t)place_entry(fl, rows[d]) * n;
+        for (int c = 0; c < n && M->with_columns; c++) row[c] += off[d][c] / by;
+        M->w[place_entry(fl, rows[d])] += (aim * at.u[d] - at.strain[d]) / by;
+        M->depth[rows[d]] = aim * at.u[d];
+        M->doubt[rows[d]] = 0.0;
+    }
+}
+
 /* the same of all sliders behind springs that slide, or that nothing presses on */
 static void drag_places(Motion *M, double phase, double t)
 {
     const Flow *fl = M->fl;
     for (int s = 0; s < fl->n_stops; s++) {
         if (!is_sprung(fl, s) || (M->closed[s] && fl->slides[s] == 0)) continue;
-        drag_place(M, s, M->closed[s] ? fl->slides[s] : 0, phase, t);
+        if (M->closed[s] && is_disc(fl, s)) {
+            if (!is_mate(fl, s)) drag_over_plane(M, s, phase, t);
+        } else {
+            drag_place(M, s, M->closed[s] ? fl->slides[s] : 0, phase, t);
+        }
     }
+}
+
+/* `load_springs` of a slider over a plane */
+static void load_disc(Motion *M, int s, double phase, double t, double roundings, double allowed)
+{
+    const Flow *fl = M->fl;
+    const Stop *slider = stop_of(fl, s);
+    double noise = 10.0 * strain_noise(fl, s, M->w);
+    double most = grip(fl, s) * larger(pressing_now(fl, s, M->w, phase).value, 0.0);
+    double force = slider->tangential * disc_now(fl, s, M->w, phase).size;
+    int before = fl->slides[s];
+    if (force > most + noise) drag_over_plane(M, s, phase, t);
+    double speed = disc_now(fl, s, M->w, phase).along;
+    double none = roundings * drag_noise(fl, s, M->w, phase);
+    if (allowed > 0.0) none += allowed * hypot(M->s->pushes[s], M->s->pushes[(int)slider->beside]);
+    bool slides = (before != 0 || at_grip(fl, s, M->w, phase, allowed)) && speed > none;
+    set_slides(fl, s, slides || slides_freely(fl, s));
+    if (fl->slides[s] != before) M->panel->na = -1;
 }
 
 /* Let the sliders behind springs slide whose friction is reached and that move on, and the others
@@ -170,6 +280,10 @@ static void load_springs(Motion *M, double phase, double t, double roundings, do
     for (int s = 0; s < fl->n_stops; s++) {
         if (!(is_sprung(fl, s) && M->closed[s]) || s == known) continue;
         if (is_pressed(fl, s) && (int)stop_of(fl, s)->normal == known) continue;
+        if (is_disc(fl, s)) {
+            if (!is_mate(fl, s)) load_disc(M, s, phase, t, roundings, allowed);
+            continue;
+        }
         Course strain = output_now(fl, s, M->w, phase);
         double force = stop_of(fl, s)->tangential * strain.value;
         double noise = 10.0 * strain_noise(fl, s, M->w);
@@ -195,10 +309,18 @@ static void press_on(Motion *M, int stop, double phase, double t)
     double pace = depth_now(fl, stop, M->w, phase).first;
     for (int s = stop + 1; s < fl->n_stops; s++) {
         if (!(is_sprung(fl, s) && is_pressed(fl, s) && (int)stop_of(fl, s)->normal == stop)) continue;
-        double speed = drag_speed(fl, s, 0, M->w, phase), growth = 0.0;
+        double speed = drag_speed(fl, s, 0, M->w, phase), growth = 0.0, fastest = speed;
+        if (is_disc(fl, s)) {
+            Disc at = disc_now(fl, s, M->w, phase);
+            fastest = hypot(at.speed[0], at.speed[1]);
+        }
         if (stop_of(fl, stop)->exponent == 1.0) growth = stop_of(fl, stop)->stiffness * pace;
-        bool slides = stop_of(fl, s)->tangential * fabs(speed) > grip(fl, s) * growth;
-        fl->slides[s] = !slides && !slides_freely(fl, s) ? 0 : speed > 0.0 ? 1 : -1;
+        bool slides = stop_of(fl, s)->tangential * fabs(fastest) > grip(fl, s) * growth;
+        slides = slides || slides_freely(fl, s);
+        if (is_disc(fl, s))
+            set_slides(fl, s, slides);
+        else
+            fl->slides[s] = !slides ? 0 : speed > 0.0 ? 1 : -1;
         if (!M->with_columns || fl->slides[s] != 0) continue;
         depth_columns(M, stop, phase, t, shift);
         double rate = -speed / strain_by_place(fl, s);

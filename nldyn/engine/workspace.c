@@ -70,6 +70,8 @@ static void lay_out_panel(Block *block, const Flow *fl, int m, Panel *panel)
     panel->F = numbers(block, nodes);
     panel->slope = numbers(block, 2 * outputs);
     panel->radial = numbers(block, nodes);
+    panel->tilt = numbers(block, N_TILTS * nodes);
+    panel->growth = numbers(block, na);
     panel->inverted = numbers(block, outputs);
     panel->there = numbers(block, 2 * size * m);
     panel->home = numbers(block, 2 * size * m);

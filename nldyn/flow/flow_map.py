@@ -52,6 +52,7 @@ from nldyn.flow.gauss import GaussTables, gauss_tables
 from nldyn.flow.options import FlowOptions, PanelBounds, _floats, _nodes_for_switch
 from nldyn.flow.packing import (
     bond_row,
+    mover_row,
     of_areas,
     parameter_tables,
     second_row,
@@ -274,26 +275,36 @@ class FlowMap:
             if not stop.pulls:
                 slowing = stop.dashpot / stop.stiffness
                 rows.append(rows[i] + slowing * s.linear.times_block(rows[i]))
-        for place, (number, size) in enumerate(zip(s.sprung, s.place_sizes, strict=True), s.size):
-            row = rows[len(s.stops) + number]  # the strain of the spring before the slider
-            rows[len(s.stops) + number] = row - size * np.eye(s.state_size)[2 * place]
+        sizes = zip(self._place_rows, s.place_sizes, strict=True)
+        for place, (of_place, size) in enumerate(sizes, s.size):
+            for row in of_place:  # the strain of the spring before the slider
+                rows[row] = rows[row] - size * np.eye(s.state_size)[2 * place]
         return np.array(rows).reshape(len(rows), s.state_size)
 
     @cached_property
     def _pushed(self) -> list[Real]:
         """Modal vectors (n,) of what forces push, in this order.
 
-        Those of stops, sliders and bonds, and along the second directions of round clearances.
+        Those of stops, sliders and bonds, and along the second directions of round clearances, then
+        along second tangents, and of the movers of both, see `plane_rows`.
         """
         s = self.system
         between = [(e.at, e.against) for e in s.sliders] + [(e.at, e.against) for e in s.bonds]
         between += [stop.ends[1] for stop in s.round_stops.values()]
+        first = [(s.sliders[i].at, s.sliders[i].against) for i in s.over_planes]
+        across = list(s.place_ends[len(s.sprung) :])
+        between += across + [ends for pair in zip(first, across, strict=True) for ends in pair]
         return [s.stop_vector(stop) for stop in s.stops] + [s.vector_between(*e) for e in between]
 
     @cached_property
     def force_columns(self) -> Real:
         """What the forces of `_pushed` do to the rates of z, (2n, n_forces)."""
         columns = [self.system.force_column(v) for v in self._pushed]
+        for entry, (of_place, size) in enumerate(
+            zip(self._place_rows, self.system.place_sizes, strict=True), self.system.size
+        ):
+            for mover in of_place[1:]:
+                columns[mover] = -np.eye(self.system.state_size)[2 * entry] / size
         return np.ascontiguousarray(np.array(columns).reshape(-1, self.system.state_size).T)
 
     def mobility(self, outputs: Sequence[int]) -> Real:
@@ -337,10 +348,32 @@ class FlowMap:
         return np.asarray(stop.sense * normal @ self.rows[self.round_rows[output]])
 
     @cached_property
+    def plane_rows(self) -> dict[int, list[int]]:
+        """The outputs of sliders over a plane: along both tangents, then those of their movers.
+
+        What a mover pushes is the place of the slider, by the speed at which that goes.
+        """
+        s = self.system
+        numbers = s.over_planes
+        second = len(s.stops) + len(s.sliders) + len(s.bonds) + len(s.round_stops)
+        first_mover = second + len(numbers)
+        return {
+            number: [len(s.stops) + number, second + i, first_mover + 2 * i, first_mover + 2 * i + 1]
+            for i, number in enumerate(numbers)
+        }
+
+    @cached_property
+    def _place_rows(self) -> list[list[int]]:
+        """For each place the outputs of its strain: of its slider and, over a plane, its mover."""
+        s, planes = self.system, self.plane_rows
+        first = [[len(s.stops) + i, *planes.get(i, [])[2:3]] for i in s.sprung]
+        return first + [[second, mover] for _, second, _, mover in planes.values()]
+
+    @cached_property
     def round_rows(self) -> dict[int, list[int]]:
         """The outputs along both directions of the round clearances."""
         numbers = list(self.system.round_stops)
-        first = len(self._pushed) - len(numbers)
+        first = len(self.system.stops) + len(self.system.sliders) + len(self.system.bonds)
         return {stop: [stop, first + place] for place, stop in enumerate(numbers)}
 
     @cached_property
@@ -410,6 +443,7 @@ class FlowMap:
             v = vectors[second]
             stops[i] = stops[i]._replace(second=float(second))
             stops.append(second_row(s.round_stops[i], i, float(v @ v), self.options))
+        stops += self._plane_stops(stops)
         powers = np.zeros((len(stops), max((len(b.coefficients) for b in s.bonds), default=0)))
         for row, bond in enumerate(s.bonds, first_bond):
             powers[row, : len(bond.coefficients)] = bond.coefficients
@@ -426,6 +460,23 @@ class FlowMap:
             self._bounds.tail,
             self._bounds.node_angle,
         )
+
+    def _plane_stops(self, stops: list[StopRow]) -> list[StopRow]:
+        """Rows of second tangents and movers; those of the first tangents, in `stops`, get theirs."""
+        more = 2 * (self.system.size + len(self.system.sprung))
+        seconds, movers = [], []
+        for i, (first, second, *both) in enumerate(self.plane_rows.values()):
+            for of, other, mover in ((first, second, both[0]), (second, first, both[1])):
+                v = self._pushed[of]
+                row = stops[first]._replace(beside=float(other), mover=float(mover))
+                if of == first:
+                    stops[first] = row
+                else:
+                    place = float(more + 2 * i)
+                    mobility = float(v @ v)
+                    seconds.append(row._replace(mobility=mobility, place=place, place_rate=0.0))
+                movers.append(mover_row(of, float(v @ v)))
+        return seconds + movers
 
     def shoot(
         self,
@@ -711,7 +762,7 @@ class FlowMap:
         return np.concatenate([self.to_modal(states), self.places(states)], axis=-1)
 
     def places(self, states: Real) -> Real:
-        """Places in m of the sliders behind springs, `System.sprung`, at states z."""
+        """Places in m of what is behind springs, `System.place_ends`, at states z."""
         states = _columns("states", states, self.system.state_size)
         return np.asarray(states[..., 2 * self.system.size :: 2] * self.system.place_sizes)
 
@@ -721,7 +772,7 @@ class FlowMap:
         Sliders behind springs are at rest in the middle, unless their places follow as in
         `to_start`.
         """
-        size, more = 2 * self.system.size, len(self.system.sprung)
+        size, more = 2 * self.system.size, len(self.system.place_ends)
         placed = more and np.shape(modal)[-1:] == (size + more,)
         modal = _columns("modal", modal, size + more if placed else size)
         states = np.asarray(modal[..., :size] @ self.system.linear.left.T)

@@ -130,6 +130,11 @@ def slider_row(slider: Slider, mobility: float, options: FlowOptions, place: int
     )
 
 
+def mover_row(slider: int, mobility: float) -> StopRow:
+    """Numbers of what moves the place of a slider over a plane, along one of its tangents."""
+    return _NO_STOP._replace(mobility=mobility, moves=float(slider))
+
+
 def parameter_tables(
     system: System, parameters: Sequence[Parameter]
 ) -> tuple[NDArray[np.int64], Complex]:

@@ -102,9 +102,14 @@ def slider_measures(motion: Trajectory) -> tuple[SliderMeasures, ...]:
         return ()
     end = motion.states(np.array([motion.span[1]]))
     ends = np.concatenate([motion.record.start, end])
-    sliders = range(len(system.sliders))
+    sliders, flow_planes = range(len(system.sliders)), system.over_planes
     return (
-        *(_measures_of(motion, number, ends) for number in sliders),
+        *(
+            _plane_measures(motion, number, ends)
+            if number in flow_planes
+            else _measures_of(motion, number, ends)
+            for number in sliders
+        ),
         *(_round_measures(motion, ring, ends) for ring in system.rubbing[len(sliders) :]),
     )
 
@@ -151,6 +156,58 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
         loss / time,
         pressed_distance / time,
     )
+
+
+def _plane_measures(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
+    """Measures of what slides over a plane.
+
+    Its place goes along the strain e of the spring, by the speed along e less the rate of |e|. What
+    the record has is the place of a strain whose length grows at a rate of its own, see
+    `nldyn/engine/friction_disc.c`: that rate is taken off again.
+    """
+    flow, rec, tables = motion.flow, motion.record, motion.flow.tables
+    slider, (first, second, *movers) = flow.system.sliders[number], flow.plane_rows[number]
+    rows, spring = [first, second], slider.tangential_stiffness or 0.0
+    panels = np.flatnonzero(rec.kind >= 0)
+    if slider.stop >= 0:
+        panels = _touching(motion, slider.stop)
+    slides = rec.force[panels][:, movers].any(axis=(1, 2))
+    sliding, duration = panels[slides], rec.duration[panels]
+    pulled, strain = rec.force[sliding][:, rows], rec.depth[sliding][:, rows]
+    moved, size = rec.force[sliding][:, movers], np.hypot(*np.moveaxis(strain, 1, 0))
+    force = np.hypot(*np.moveaxis(pulled, 1, 0))
+    time = rec.duration[sliding, None] * tables.chi[rec.kind[sliding]]
+    growth = (size[:, -1] - size[:, 0]) / (time[:, -1] - time[:, 0])
+    along = (strain * moved).sum(axis=1) / np.where(size > 0.0, size, 1.0) + growth[:, None]
+    along = np.where(force > 0.0, along, np.hypot(*np.moveaxis(moved, 1, 0)))
+    way = along * _times_of_nodes(motion, sliding)
+    at_ends = np.where(force.any(axis=1), np.hypot(*(ends @ flow.rows[rows].T).T)[[sliding, sliding + 1]], 0.0)
+    distance = float(way.sum() - (at_ends[1] - at_ends[0]).sum())
+    loss = float((force * way).sum() - 0.5 * spring * (at_ends[1] ** 2 - at_ends[0] ** 2).sum())
+    fine = rec.force[panels][:, rows] @ fine_table(tables.nodes.size).T
+    mu, whole = slider.friction.coefficient, float(rec.duration.sum())
+    pressed = loss / mu if mu > 0.0 else _pressed_way(motion, slider, sliding, way)
+    return SliderMeasures(
+        slider,
+        flow.system.unit(slider.at) == "rad",
+        float(peaks(np.hypot(*np.moveaxis(fine, 1, 0))).max(initial=0.0)),
+        distance,
+        float(duration[~slides].sum()) / whole,
+        float(duration[slides].sum()) / whole,
+        1.0 - float(duration.sum()) / whole,
+        loss,
+        pressed,
+        loss / whole,
+        pressed / whole,
+    )
+
+
+def _pressed_way(
+    motion: Trajectory, slider: Slider, panels: NDArray[np.intp], way: Real
+) -> float:
+    """Integral of the normal force over ways (k, m) of the nodes of panels."""
+    pressed = motion.record.force[panels, slider.stop] if slider.stop >= 0 else slider.normal_force
+    return float((pressed * way).sum())
 
 
 def _ways_of_nodes(flow: FlowMap, values: Real) -> Real:

@@ -115,6 +115,7 @@ def _told_friction(system: System) -> dict[str, Any]:
                 stop.tangent_against,
                 astuple(stop.friction),
                 getattr(stop, "tangential_stiffness", None),
+                *(getattr(stop, "across", None) or ()),
             ]
             for place, stop in enumerate(system.stops)
             if not isinstance(stop, RoundStop) and isinstance(stop.friction, Friction)
@@ -126,6 +127,7 @@ def _told_friction(system: System) -> dict[str, Any]:
                 astuple(damper.friction),
                 damper.against,
                 damper.tangential_stiffness,
+                *(damper.across or ()),
             ]
             for place, damper in enumerate(system.dampers)
             if isinstance(damper, DryFriction) and isinstance(damper.friction, Friction)
@@ -216,6 +218,8 @@ def _with_friction(
             own = {"tangent": tangent, "tangent_against": against, "friction": Friction(*law)}
             if spring and spring[0] is not None:  # earlier versions do not tell it
                 own["tangential_stiffness"] = spring[0]
+            if len(spring) > 1:
+                own["second_tangent"], own["second_tangent_against"] = spring[1:]
             rough[int(place)] = replace(rough[int(place)], **own)
         for place, (at, normal, law, *ends) in told["dampers"].items():
             all_dampers.insert(int(place), DryFriction(at, normal, Friction(*law), *ends))
@@ -426,7 +430,7 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
         if str(error).startswith(str(group.path)):
             raise
         raise SystemModelError(f"{group.path}: {error}") from error
-    basis, places = group.group("basis"), len(system.sprung)
+    basis, places = group.group("basis"), len(system.place_ends)
     vars(system)["linear"] = LinearPart(
         basis.array("blocks", n + places, 2, 2),
         basis.array("right", 2 * n, system.state_size),

@@ -473,7 +473,7 @@ def starting_state(flow: FlowMap, start: Real | None) -> Real:
     if start is None:
         return np.zeros(flow.system.state_size)
     modal = numbers("start", start)
-    if modal.shape not in ((size,), (size + len(flow.system.sprung),)):
+    if modal.shape not in ((size,), (size + len(flow.system.place_ends),)):
         raise SystemModelError(
             f"start must have {size} entries, displacements and velocities of "
             f"{flow.system.size} modes, got shape {modal.shape}"

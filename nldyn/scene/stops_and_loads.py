@@ -82,6 +82,8 @@ def _rough(scene: Scene, stops: list[AnyStop]) -> tuple[AnyStop, ...]:
         rough["friction"] = table.of_coulomb
         if isinstance(stop, Stop):
             rough["tangential_stiffness"] = table.tangential_stiffness
+            rough["second_tangent"] = table.second_tangent
+            rough["second_tangent_against"] = table.second_tangent_against
         elif table.tangential_stiffness is not None:
             fault = f"needs no tangential_stiffness: stop {table.stop} is rigid"
             raise scene_error(scene.file, ("friction", number, "tangential_stiffness"), fault)

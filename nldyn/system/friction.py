@@ -107,6 +107,34 @@ def check_spring(owner: str, stiffness: float | None, law: Friction) -> None:
         )
 
 
+Across = tuple[str | None, str | None] | None  # ends of a second tangent
+
+
+def across_of(second: str | None, against: str | None) -> Across:
+    """Ends of a second tangent, None if there is nothing of one."""
+    return None if second is None and against is None else (second, against)
+
+
+def check_plane(
+    owner: str, first: tuple[str | None, ...], across: Across, stiffness: float | None
+) -> None:
+    """Refuse a second tangent that is no interface of its own, or has no spring before it."""
+    if across is None:
+        return
+    for name, end in zip(("second_tangent", "second_tangent_against"), across, strict=True):
+        check_types(**{f"{owner}: {name}": (end, str, None)})
+    if across[0] is None:
+        raise SystemModelError(f"{owner}: second_tangent_against needs a second_tangent")
+    if across[0] in (*first, across[1]):
+        raise SystemModelError(f"{owner}: second_tangent must be another interface")
+    if stiffness is None:
+        raise SystemModelError(
+            f"{owner}: friction with a second_tangent needs a tangential_stiffness: without a "
+            "spring what comes to rest in a plane would do so in no time at which its force is "
+            "told"
+        )
+
+
 @dataclass(frozen=True)
 class DryFriction:
     r"""Dry friction that acts all the time: :math:`F = \mu(v)\,N\,\mathrm{sign}\,v`, exactly.
@@ -128,6 +156,12 @@ class DryFriction:
         k_t in N/m of a spring between the interface and the slider: Jenkins' element. Where it
         sticks, the force is k_t times the strain of the spring, where it slides, μ N. Several at
         one interface are an Iwan chain. Without it nothing gives way.
+    second_tangent : str, optional
+        Interface at the same place, perpendicular to `at`, of what slides over a plane: its force
+        is μ N along the strain of the spring, in any direction of the plane. It needs a
+        `tangential_stiffness`, which is the same in all directions.
+    second_tangent_against : str, optional
+        The same interface of what it slides on; the ground unless given.
 
     Raises
     ------
@@ -152,6 +186,8 @@ class DryFriction:
     friction: Friction | float
     against: str | None = None
     tangential_stiffness: float | None = None
+    second_tangent: str | None = None
+    second_tangent_against: str | None = None
 
     def __post_init__(self) -> None:
         check_ends("dry friction", self.at, self.against)
@@ -159,11 +195,17 @@ class DryFriction:
         check_positive(owner, "normal_force", self.normal_force)
         object.__setattr__(self, "friction", as_friction(owner, self.friction))
         check_spring(owner, self.tangential_stiffness, self.law)
+        check_plane(owner, (self.at, self.against), self.across, self.tangential_stiffness)
 
     @property
     def law(self) -> Friction:
         """The law of friction."""
         return as_friction(self.at, self.friction)
+
+    @property
+    def across(self) -> Across:
+        """Ends of its second tangent, if it has one."""
+        return across_of(self.second_tangent, self.second_tangent_against)
 
 
 @dataclass(frozen=True)
@@ -181,6 +223,8 @@ class Slider:
         Force in N that does so in place of a stop's.
     tangential_stiffness : float, optional
         Stiffness in N/m of the spring before it.
+    across : (str, str or None), optional
+        The same interfaces along the second tangent of what slides over a plane.
     """
 
     at: str
@@ -189,3 +233,10 @@ class Slider:
     stop: int = -1
     normal_force: float = 0.0
     tangential_stiffness: float | None = None
+    across: Across = None
+
+    @property
+    def ends(self) -> tuple[tuple[str | None, str | None], ...]:
+        """The interface and that on the other side, along each tangent."""
+        first = (self.at, self.against)
+        return (first,) if self.across is None else (first, self.across)

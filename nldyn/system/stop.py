@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from nldyn.base.arrays import TINY, Real
 from nldyn.base.errors import SystemModelError, check_types, shown
 from nldyn.system.contact_law import ContactLaw, check_law, power_law
-from nldyn.system.friction import Friction, as_friction, check_spring
+from nldyn.system.friction import Across, Friction, across_of, as_friction, check_plane, check_spring
 from nldyn.system.values import check_finite, check_not_negative, check_positive, check_sides
 
 LARGEST_EXPONENT = 4.0
@@ -291,6 +291,12 @@ class Stop:
     tangential_stiffness : float, optional
         k_t in N/m of a spring along the surface, before the friction: where that sticks, the spring
         gives way. Without it nothing does.
+    second_tangent : str, optional
+        Interface at the same place along the surface, perpendicular to `tangent`: the body slides
+        over the plane of both, and the force of friction is against its sliding there. It needs a
+        `tangential_stiffness`, which is the same in all directions.
+    second_tangent_against : str, optional
+        The same interface of what is on the other side; the ground unless given.
 
     Raises
     ------
@@ -319,6 +325,8 @@ class Stop:
     area: str | None = None
     share: float = 1.0
     tangential_stiffness: float | None = None
+    second_tangent: str | None = None
+    second_tangent_against: str | None = None
     impulsive: ClassVar[bool] = False  # whether velocities jump where it is hit
 
     def __post_init__(self) -> None:
@@ -354,7 +362,8 @@ class Stop:
     def _check_friction(self, owner: str) -> None:
         ends = (self.tangent, self.tangent_against)
         law = check_tangent(owner, self.at, ends, self.friction)
-        if law is None and self.tangential_stiffness is None:
+        across = self.across
+        if law is None and self.tangential_stiffness is None and across is None:
             return
         if law is None:
             raise SystemModelError(f"{owner}: friction needs both friction and tangent")
@@ -367,6 +376,13 @@ class Stop:
             raise SystemModelError(f"{owner}: give either a dashpot or a tangential_stiffness")
         object.__setattr__(self, "friction", law)
         check_spring(owner, self.tangential_stiffness, law)
+        first = (self.at, self.against, *ends)
+        check_plane(owner, first, across, self.tangential_stiffness)
+
+    @property
+    def across(self) -> Across:
+        """Ends of its second tangent, if it has one."""
+        return across_of(self.second_tangent, self.second_tangent_against)
 
     @property
     def law_of_friction(self) -> Friction:

@@ -392,8 +392,8 @@ class System:
 
     @property
     def state_size(self) -> int:
-        """Number of coordinates of a state z: 2n, and two of each slider behind a spring."""
-        return 2 * (self.size + len(self.sprung))
+        """Number of coordinates of a state z: 2n, and two of each place behind a spring."""
+        return 2 * (self.size + len(self.place_ends))
 
     @property
     def frequencies_hz(self) -> Real:
@@ -450,6 +450,7 @@ class System:
                 stop.friction,
                 number,
                 tangential_stiffness=getattr(stop, "tangential_stiffness", None),
+                across=getattr(stop, "across", None),
             )
             for number, stop in enumerate(self.stops)
             if not isinstance(stop, RoundStop)
@@ -460,7 +461,9 @@ class System:
         return (
             *at_stops,
             *(
-                Slider(d.at, d.against, d.law, -1, d.normal_force, d.tangential_stiffness)
+                Slider(
+                    d.at, d.against, d.law, -1, d.normal_force, d.tangential_stiffness, d.across
+                )
                 for d in dry
             ),
         )
@@ -487,9 +490,20 @@ class System:
 
     @cached_property
     def place_sizes(self) -> Real:
-        """Displacements of these sliders at unit coordinates of their places, in m."""
-        sprung = [self.sliders[number] for number in self.sprung]
-        return np.array([np.linalg.norm(self.vector_between(s.at, s.against)) for s in sprung])
+        """Displacements at unit coordinates of the places of `place_ends`, in m."""
+        return np.array([np.linalg.norm(self.vector_between(*ends)) for ends in self.place_ends])
+
+    @cached_property
+    def over_planes(self) -> tuple[int, ...]:
+        """Numbers of the sliders that slide over a plane: they have two tangents, and places."""
+        return tuple(i for i, slider in enumerate(self.sliders) if slider.across is not None)
+
+    @cached_property
+    def place_ends(self) -> tuple[tuple[str, str | None], ...]:
+        """Interfaces of the places in the state: of `sprung`, then along second tangents."""
+        first = [(self.sliders[i].at, self.sliders[i].against) for i in self.sprung]
+        across = [self.sliders[i].across for i in self.over_planes]
+        return (*first, *((at, against) for at, against in filter(None, across) if at is not None))
 
     @property
     def loses_by_speed(self) -> bool:
@@ -505,9 +519,11 @@ class System:
         """Number of the displacement of an interface among the outputs of a flow map.
 
         Before it come the penetrations of the stops, the displacements of sliders and bonds, and
-        those along the second directions of round clearances.
+        those along the second directions of round clearances, then three of each slider over a
+        plane.
         """
         acting = len(self.stops) + len(self.sliders) + len(self.bonds) + len(self.round_stops)
+        acting += 3 * len(self.over_planes)
         return acting + self.interfaces.index(interface)
 
     @property
@@ -638,7 +654,7 @@ class System:
             squares += slope * (c if modes is None else modes.T @ c) ** 2
         part = linear_part(omega, D, np.sqrt(squares), cross)
         part = part if modes is None else part.of_modes(modes)
-        return part.with_places(len(self.sprung))
+        return part.with_places(len(self.place_ends))
 
     def vector_between(self, at: str, against: str | None) -> Real:
         """Modal vector of the displacement at an interface, less that at another one, (n,)."""
@@ -952,10 +968,10 @@ class System:
 
     def _check_sliders(self) -> None:
         """Refuse sliders that hold one motion together: what each holds would not be told."""
-        for slider in (self.sliders[number] for number in self.sprung):
-            if not np.any(self.vector_between(slider.at, slider.against)):
+        for at, against in self.place_ends:
+            if not np.any(self.vector_between(at, against)):
                 raise SystemModelError(
-                    f"friction at '{slider.at}' acts on no motion: none of the {self.size} modes "
+                    f"friction at '{at}' acts on no motion: none of the {self.size} modes "
                     "moves there"
                 )
         for stop in self.rigid_stops.values():
@@ -1036,7 +1052,8 @@ class System:
 
 def _ends_of(element: Any) -> Iterator[tuple[str, str]]:
     """What the ends of an element are called, and the interfaces there."""
-    for end in ("at", "against", "tangent", "tangent_against"):
+    ends = ("at", "against", "tangent", "tangent_against", "second_tangent", "second_tangent_against")
+    for end in ends:
         name = getattr(element, end, None)
         if name is not None:
             yield end, name

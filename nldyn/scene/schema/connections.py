@@ -153,6 +153,11 @@ class FrictionTable(TwoEnds):
     tangential_stiffness: Positive | None = None
     """[N/m] Stiffness of a spring along the surface before what slides, above 0: Jenkins' element.
     Several tables at one interface are an Iwan chain. Without it nothing gives way."""
+    second_tangent: str | None = None
+    """Interface at the same place along the surface, perpendicular to `at`: it slides over the plane
+    of both. Needs a `tangential_stiffness`, which is the same in all directions."""
+    second_tangent_against: str | None = None
+    """The same interface at the other side; the ground unless given."""
 
     @model_validator(mode="after")
     def _one_pressure(self) -> FrictionTable:
@@ -165,6 +170,16 @@ class FrictionTable(TwoEnds):
             raise ValueError("has a 'fading_speed', which needs the 'at_rest' that fades")
         if (self.at_rest or 0.0) > self.coefficient and self.tangential_stiffness is not None:
             raise ValueError("has a 'tangential_stiffness', before which 'at_rest' is no other one")
+        if self.second_tangent is None and self.second_tangent_against is not None:
+            raise ValueError("has a 'second_tangent_against', which needs a 'second_tangent'")
+        if self.second_tangent is not None and self.tangential_stiffness is None:
+            raise ValueError("has a 'second_tangent', which needs a 'tangential_stiffness'")
+        if self.second_tangent is not None and self.second_tangent in (
+            self.at,
+            self.against,
+            self.second_tangent_against,
+        ):
+            raise ValueError("needs another interface as 'second_tangent'")
         return self
 
     @property
@@ -175,5 +190,8 @@ class FrictionTable(TwoEnds):
     def made(self) -> DryFriction:
         """The friction of what a constant force presses on."""
         assert self.normal_force is not None
-        spring = self.tangential_stiffness
-        return DryFriction(self.at, self.normal_force, self.of_coulomb, self.against, spring)
+        spring, across = self.tangential_stiffness, self.second_tangent
+        return DryFriction(
+            self.at, self.normal_force, self.of_coulomb, self.against, spring, across,
+            self.second_tangent_against,
+        )  # fmt: skip
