@@ -1,4 +1,4 @@
-"""Motions that slide over planes, computed without the flow map: integration from event to event."""
+"""Motions that slide over planes, computed without the flow map, from event to event."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ OPEN, STICKS, SLIDES = "open", "sticks", "slides"
 class Disc:
     """Where a body slides over the plane of two `tangents` (2, n) behind a spring.
 
-    It is pressed on by a constant force or by a stop k (normal . q - gap)^p. What it slides on moves
-    along the first tangent.
+    It is pressed on by a constant force or by a stop k (normal . q - gap)^p. What it slides on
+    moves along the first tangent.
     """
 
     tangents: Vector
@@ -82,7 +82,8 @@ class Body:
 
     def margin(self, i: int, y: Vector) -> float:
         contact = self.contacts[i]
-        return contact.grip(y) * (1.0 + 1e-12) - contact.spring * float(np.hypot(*self.strain(i, y)))
+        force = contact.spring * float(np.hypot(*self.strain(i, y)))
+        return contact.grip(y) * (1.0 + 1e-12) - force
 
     def rate(self, t: float, y: Vector) -> Vector:
         n = len(self.mass)
@@ -119,9 +120,9 @@ class Body:
         if kind == "close":
             growth = 0.0
             if contact.exponent == 1.0 and contact.normal is not None:
-                growth = contact.grip_pace(y + 0.0) or contact.coefficient * contact.stiffness * float(
-                    contact.normal @ y[len(self.mass) : 2 * len(self.mass)]
-                )
+                n = len(self.mass)
+                pace = float(contact.normal @ y[n : 2 * n])
+                growth = contact.coefficient * contact.stiffness * pace
             fast = contact.spring * float(np.hypot(*contact.speed(y))) > growth
             self.modes[i] = SLIDES if fast else STICKS
         else:

@@ -356,10 +356,10 @@ class FlowMap:
         s = self.system
         numbers = s.over_planes
         second = len(s.stops) + len(s.sliders) + len(s.bonds) + len(s.round_stops)
-        first_mover = second + len(numbers)
+        movers = range(second + len(numbers), second + 3 * len(numbers), 2)
         return {
-            number: [len(s.stops) + number, second + i, first_mover + 2 * i, first_mover + 2 * i + 1]
-            for i, number in enumerate(numbers)
+            number: [len(s.stops) + number, second + i, *range(mover, mover + 2)]
+            for i, (number, mover) in enumerate(zip(numbers, movers, strict=True))
         }
 
     @cached_property
@@ -462,7 +462,7 @@ class FlowMap:
         )
 
     def _plane_stops(self, stops: list[StopRow]) -> list[StopRow]:
-        """Rows of second tangents and movers; those of the first tangents, in `stops`, get theirs."""
+        """Rows of second tangents and movers; first tangents, in `stops`, are told of theirs."""
         more = 2 * (self.system.size + len(self.system.sprung))
         seconds, movers = [], []
         for i, (first, second, *both) in enumerate(self.plane_rows.values()):

@@ -102,11 +102,11 @@ def slider_measures(motion: Trajectory) -> tuple[SliderMeasures, ...]:
         return ()
     end = motion.states(np.array([motion.span[1]]))
     ends = np.concatenate([motion.record.start, end])
-    sliders, flow_planes = range(len(system.sliders)), system.over_planes
+    sliders, over_planes = range(len(system.sliders)), system.over_planes
     return (
         *(
             _plane_measures(motion, number, ends)
-            if number in flow_planes
+            if number in over_planes
             else _measures_of(motion, number, ends)
             for number in sliders
         ),
@@ -181,7 +181,8 @@ def _plane_measures(motion: Trajectory, number: int, ends: Real) -> SliderMeasur
     along = (strain * moved).sum(axis=1) / np.where(size > 0.0, size, 1.0) + growth[:, None]
     along = np.where(force > 0.0, along, np.hypot(*np.moveaxis(moved, 1, 0)))
     way = along * _times_of_nodes(motion, sliding)
-    at_ends = np.where(force.any(axis=1), np.hypot(*(ends @ flow.rows[rows].T).T)[[sliding, sliding + 1]], 0.0)
+    lengths = np.hypot(*(ends @ flow.rows[rows].T).T)
+    at_ends = np.where(force.any(axis=1), lengths[[sliding, sliding + 1]], 0.0)
     distance = float(way.sum() - (at_ends[1] - at_ends[0]).sum())
     loss = float((force * way).sum() - 0.5 * spring * (at_ends[1] ** 2 - at_ends[0] ** 2).sum())
     fine = rec.force[panels][:, rows] @ fine_table(tables.nodes.size).T

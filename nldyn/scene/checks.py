@@ -552,6 +552,10 @@ def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
         for number, entry in enumerate(getattr(scene, kind)):
             if getattr(entry, "against", None) is not None:
                 yield (kind, number, "against"), entry.against
+    for number, rough in enumerate(scene.friction):
+        for key in ("second_tangent", "second_tangent_against"):
+            if getattr(rough, key) is not None:
+                yield ("friction", number, key), getattr(rough, key)
     for number, area in enumerate(scene.contact_areas):
         if isinstance(area, ListedAreaTable):
             for key in ("at", "against", "along", "along_against"):

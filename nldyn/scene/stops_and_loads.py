@@ -84,6 +84,9 @@ def _rough(scene: Scene, stops: list[AnyStop]) -> tuple[AnyStop, ...]:
             rough["tangential_stiffness"] = table.tangential_stiffness
             rough["second_tangent"] = table.second_tangent
             rough["second_tangent_against"] = table.second_tangent_against
+        elif table.second_tangent is not None:
+            fault = f"is not for stop {table.stop}, which is rigid and has no spring along a plane"
+            raise scene_error(scene.file, ("friction", number, "second_tangent"), fault)
         elif table.tangential_stiffness is not None:
             fault = f"needs no tangential_stiffness: stop {table.stop} is rigid"
             raise scene_error(scene.file, ("friction", number, "tangential_stiffness"), fault)

@@ -93,7 +93,8 @@ def slider_name(system: System, number: int) -> str:
     if slider.stop in system.round_stops:
         return f"friction, {stop_name(system, slider.stop)}"
     plane = "" if slider.across is None else f", '{slider.across[0]}'"
-    name = f"friction at '{slider.at}'{plane}" + (f" against '{slider.against}'" if slider.against else "")
+    name = f"friction at '{slider.at}'{plane}"
+    name += f" against '{slider.against}'" if slider.against else ""
     return f"{name}, {stop_name(system, slider.stop)}" if slider.stop >= 0 else name
 
 

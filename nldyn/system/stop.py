@@ -14,7 +14,14 @@ from scipy.optimize import brentq
 from nldyn.base.arrays import TINY, Real
 from nldyn.base.errors import SystemModelError, check_types, shown
 from nldyn.system.contact_law import ContactLaw, check_law, power_law
-from nldyn.system.friction import Across, Friction, across_of, as_friction, check_plane, check_spring
+from nldyn.system.friction import (
+    Across,
+    Friction,
+    across_of,
+    as_friction,
+    check_plane,
+    check_spring,
+)
 from nldyn.system.values import check_finite, check_not_negative, check_positive, check_sides
 
 LARGEST_EXPONENT = 4.0

@@ -1052,8 +1052,8 @@ class System:
 
 def _ends_of(element: Any) -> Iterator[tuple[str, str]]:
     """What the ends of an element are called, and the interfaces there."""
-    ends = ("at", "against", "tangent", "tangent_against", "second_tangent", "second_tangent_against")
-    for end in ends:
+    tangents = ("tangent", "tangent_against", "second_tangent", "second_tangent_against")
+    for end in ("at", "against", *tangents):
         name = getattr(element, end, None)
         if name is not None:
             yield end, name

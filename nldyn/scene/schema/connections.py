@@ -154,8 +154,8 @@ class FrictionTable(TwoEnds):
     """[N/m] Stiffness of a spring along the surface before what slides, above 0: Jenkins' element.
     Several tables at one interface are an Iwan chain. Without it nothing gives way."""
     second_tangent: str | None = None
-    """Interface at the same place along the surface, perpendicular to `at`: it slides over the plane
-    of both. Needs a `tangential_stiffness`, which is the same in all directions."""
+    """Interface at the same place along the surface, perpendicular to `at`: it slides over the
+    plane of both. Needs a `tangential_stiffness`, which is the same in all directions."""
     second_tangent_against: str | None = None
     """The same interface at the other side; the ground unless given."""
 
@@ -181,6 +181,13 @@ class FrictionTable(TwoEnds):
         ):
             raise ValueError("needs another interface as 'second_tangent'")
         return self
+
+    @property
+    def ends(self) -> list[tuple[str, str | None]]:
+        """The interfaces at both ends, along each tangent."""
+        if self.second_tangent is None:
+            return super().ends
+        return [*super().ends, (self.second_tangent, self.second_tangent_against)]
 
     @property
     def of_coulomb(self) -> Friction:

@@ -113,3 +113,56 @@ def test_bad_friction_is_refused_with_its_place(tmp_path, change, told):
     with pytest.raises(SceneError, match="friction") as error:
         build_system(scene_with(tmp_path, text))
     assert told in str(error.value)
+
+
+OVER_A_PLANE = """
+[[friction]]
+at = "along"
+coefficient = 0.3
+stop = {stop}
+tangential_stiffness = 20.0
+second_tangent = "{second}"
+"""
+
+
+def over_a_plane(stop=0, second="aside"):
+    return OVER_A_PLANE.format(stop=stop, second=second)
+
+
+def with_third(tmp_path, other):
+    path = tmp_path / "scene.toml"
+    three = "[[1.0, 0.0, 0.0], [0.0, {}, 0.0], [0.0, 0.0, 1.0]]"
+    text = SCENE.replace("[[1.0, 0.0], [0.0, 1.0]]", three.replace("{}", "1.0"))
+    text = text.replace("[[1.0, 0.0], [0.0, 4.0]]", three.replace("{}", "4.0"))
+    text = text.replace("across = [1.0, 0.0]", "across = [1.0, 0.0, 0.0]\naside = [0.0, 0.0, 1.0]")
+    text = text.replace("along = [0.0, 1.0]", "along = [0.0, 1.0, 0.0]")
+    path.write_text(text.format(other=other))
+    return load_scene(path)
+
+
+def test_a_second_tangent_makes_friction_over_a_plane(tmp_path):
+    system = build_system(with_third(tmp_path, over_a_plane()))
+    slider = system.sliders[0]
+    assert (slider.across, slider.tangential_stiffness) == (("aside", None), 20.0)
+    assert describe_slider(slider) == (
+        "friction at 'along', over the plane with 'aside': coefficient 0.3, behind 20 N/m, "
+        "pressed on by stop 0"
+    )
+    assert system.output("along") == 2 + 2 + 3 + system.interfaces.index("along")
+
+
+@pytest.mark.parametrize(
+    ("other", "told"),
+    [
+        (over_a_plane(second="nowhere"), r"friction\[1\]\.second_tangent.*nowhere"),
+        (over_a_plane(second="along"), "another interface as 'second_tangent'"),
+        (over_a_plane(stop=1), "is not for stop 1, which is rigid"),
+        (
+            over_a_plane().replace("tangential_stiffness = 20.0", ""),
+            "'second_tangent', which needs a 'tangential_stiffness'",
+        ),
+    ],
+)
+def test_bad_second_tangents_are_refused(tmp_path, other, told):
+    with pytest.raises(SceneError, match=told):
+        build_system(with_third(tmp_path, other))
