@@ -149,13 +149,13 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
     first = len(system.stops)
     rubs = np.zeros((len(phases), first))  # friction per unit of the force of a rigid stop
     holds = np.zeros((len(phases), len(system.sliders)), dtype=bool)
-    for number, (*rows, _, _) in flow.plane_rows.items():
+    for number, (*tangents, _, _) in flow.plane_rows.items():
         slider = system.sliders[number]
-        pulled = (slider.tangential_stiffness or 0.0) * states @ flow.rows[rows].T
+        pulled = (slider.tangential_stiffness or 0.0) * states @ flow.rows[tangents].T
         most = slider.friction.coefficient * _normal_force(flow, slider, states)
         size = np.hypot(pulled[:, 0], pulled[:, 1])
         share = np.minimum(1.0, most / np.where(size > 0.0, size, 1.0))
-        rates -= (share[:, None] * pulled) @ data.force[:, rows].T
+        rates -= (share[:, None] * pulled) @ data.force[:, tangents].T
     for i, slider in enumerate(system.sliders, first):
         if i - first in system.over_planes:
             continue
