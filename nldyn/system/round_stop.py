@@ -110,7 +110,6 @@ class RoundStop:
     friction: float = 0.0
     surface_speed: float | None = None
     impulsive: ClassVar[bool] = False
-    jumps: ClassVar[bool] = False
     dashpot: ClassVar[float] = 0.0
     pulls: ClassVar[bool] = True
     direction: ClassVar[int] = 1
@@ -202,6 +201,11 @@ class RoundStop:
     def rub(self) -> float:
         """Coefficient of friction in the sense of the surface that turns, without the whirl."""
         return float(np.copysign(self.friction, self.sliding_speed))
+
+    @property
+    def jumps(self) -> bool:
+        """Whether its force may jump: friction does where the surface turns."""
+        return self.friction > 0.0
 
     @property
     def is_linear(self) -> bool:

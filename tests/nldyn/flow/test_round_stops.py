@@ -192,6 +192,34 @@ def test_what_whirls_the_other_way_does_the_same_in_a_mirror():
     assert sizes[1] == pytest.approx(sizes[0], abs=1e-9)
 
 
+def test_a_branch_goes_on_where_a_tube_begins_to_stick():
+    ring = RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=0.6, surface_speed=0.0)
+    system = System.from_matrices(
+        MASS * np.eye(2), STIFFNESS * np.eye(2), PLANE, damping=4.0 * DAMPING * np.eye(2),
+        stops=[ring],
+        excitation=[HarmonicForce("x", 3.0), HarmonicForce("y", 2.0, phase_deg=-30.0)],
+    )  # fmt: skip
+    branch = continue_branch(solve_orbit(system, 9.9), (9.9, 10.7))
+    assert branch.stop_reason == "end of the frequency range / end of the frequency range"
+    first, last = branch.points[0], branch.points[-1]
+    assert first.friction[0].stuck == 0.0 and math.isfinite(first.liouville_error)
+    assert last.friction[0].stuck > 0.1 and math.isnan(last.liouville_error)
+    w = last.omega
+
+    def load_at(t):
+        return np.array([3.0 * math.cos(w * t), 2.0 * math.cos(w * t - math.pi / 6.0)])
+
+    rotor = Rotor(
+        MASS * np.eye(2), 4.0 * DAMPING * np.eye(2), STIFFNESS * np.eye(2), load_at,
+        [Ring(np.eye(2), 5e4, CLEARANCE, friction=0.6)],
+    )  # fmt: skip
+    start = last.states(np.zeros(1))[0] / math.sqrt(MASS)
+    end, _, passed, work = rotor.followed(start, last.duration, last.duration / 400)
+    assert end == pytest.approx(start, abs=1e-8 * np.abs(start).max())
+    assert turns(passed) == (2, 2, 0)
+    assert last.friction[0].work_rate == pytest.approx(work / last.duration, rel=1e-8)
+
+
 class Roll:
     """The backward whirl of a disc that rolls in a ring without slipping, driven by nothing else.
 
