@@ -988,6 +988,13 @@ class System:
                     f"friction at '{stop.tangent}' acts on no motion along the rigid stop at "
                     f"'{stop.at}': in the {self.size} modes both are one motion, or none"
                 )
+        for ring in self.round_stops.values():
+            if ring.friction and _rank(self.stop_vectors(ring), self.size) < 2:
+                x, y = ring.plane
+                raise SystemModelError(
+                    f"friction of the round clearance at '{x}', '{y}' acts on no motion all around:"
+                    f" in the {self.size} modes both are one motion, or none"
+                )
         for together in self._sliders_at_once() if self.sliders else ():
             rows = [self.vector_between(s.at, s.against) for s in together]
             if _rank(rows, self.size) < len(rows):

@@ -605,6 +605,12 @@ def test_bad_numbers_are_told(values, said):
         RoundStop(**{**good, **values})
 
 
+def test_friction_in_a_plane_of_one_motion_is_told():
+    ring = RoundStop(("x", "y"), 5e4, CLEARANCE, 1.0, friction=0.2, surface_speed=0.0)
+    with pytest.raises(SystemModelError, match="no motion all around"):
+        System.from_matrices([[MASS]], [[STIFFNESS]], {"x": [1.0], "y": [0.5]}, stops=[ring])
+
+
 def test_unknown_interfaces_are_told():
     with pytest.raises(SystemModelError, match="'z'"):
         jeffcott([RoundStop(("x", "z"), 1e6, 1e-3)])
