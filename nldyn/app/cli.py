@@ -20,6 +20,7 @@ import click
 from nldyn.app.describe import (
     describe,
     describe_rest,
+    describe_self_excited,
     describe_system,
     described_as_json,
     echo_parts,
@@ -296,13 +297,14 @@ def check(scene: Path, mesh_folders: tuple[Path, ...], as_json: bool) -> None:
                 "mass_kg": table.mass,
                 "modes": table.as_json(),
                 **described_as_json(system),
+                "self_excited": loaded.self_excited,
                 "at_rest": at_rest,
                 "notes": remarks(loaded, system),
             }))  # fmt: skip
             return
         echo_parts(parts)
         described = describe_system(system, 0 if reduced is None else reduced.residual_modes)
-        click.echo("\n".join([described, *at_rest]))
+        click.echo("\n".join([described, *at_rest, *describe_self_excited(loaded)]))
         check_run()
         if structure.candidates is not None and loaded.reduction is not None:
             click.echo(

@@ -13,6 +13,7 @@ import click
 
 if TYPE_CHECKING:
     from nldyn.base.arrays import Real
+    from nldyn.scene.schema.scene import Scene
     from nldyn.search.diagram import Diagram
     from nldyn.system.friction import Slider
     from nldyn.system.rigid_stop import AnyStop
@@ -83,6 +84,18 @@ def describe_rest(system: System) -> list[str]:
         f"at rest: {_places(system, q)}",
         *(f"or at rest: {_places(system, other)}" for other in others),
         *_closed(system, q),
+    ]
+
+
+def describe_self_excited(scene: Scene) -> list[str]:
+    """Say what is computed of a scene whose motions nothing excites."""
+    if not scene.self_excited:
+        return []
+    assert scene.continuation is not None
+    low, high = scene.continuation.limits
+    return [
+        "nothing excites it: motions that excite themselves are followed, with their frequency, "
+        f"over {scene.continuation.parameter} from {low:g} to {high:g}"
     ]
 
 

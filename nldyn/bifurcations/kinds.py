@@ -32,7 +32,7 @@ KINDS = {
     "BP": Kind("branch point", "^", 1.0),
     "GR": Kind("grazing", "x"),
 }
-EVENT_MARKERS = {"phase resonance": "P", "amplitude antiresonance": "v"}
+EVENT_MARKERS = {"phase resonance": "P", "amplitude antiresonance": "v", "Hopf": "h"}
 
 
 def kind_of(name: str) -> Kind:

@@ -43,6 +43,7 @@ from nldyn.bifurcations.point import (
 )
 from nldyn.bifurcations.rigid_grazing import RigidGrazing, RootMap, turned
 from nldyn.bifurcations.rigid_touch import Touches
+from nldyn.bifurcations.self_excited import GRAZING_SLIDING, HOPF
 from nldyn.orbits.bordered import FREE, Place, correct
 from nldyn.orbits.conditions import Grazing, output_slope
 from nldyn.orbits.orbit import Orbit, minimal_period
@@ -144,6 +145,8 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
     ----------
     Yu. A. Kuznetsov (2004), *Elements of Applied Bifurcation Theory*, 3rd ed., section 5.4.
     """
+    if getattr(getattr(special, "orbit", None), "self_excited", False):
+        return _of_limit_cycle(special)
     check_special(
         "describe_special", special, of_branch=getattr(special, "kind", "") in ("GR", "BP")
     )
@@ -168,6 +171,21 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
             "BP": ("Branch point", "branch point"),
         }[special.kind]
         return NormalForm(name, f"{title} at {_hz(special)}: no coefficient can be given, {error}.")
+
+
+def _of_limit_cycle(special: SpecialPoint) -> NormalForm:
+    """What happens at a special point of self-excited motions; no coefficient is computed."""
+    name, meaning = {
+        "LP": ("fold", "two limit cycles meet"),
+        "PD": ("flip", "a limit cycle of about twice the period branches off"),
+        "NS": ("torus", "quasi-periodic motions branch off"),
+        "BP": ("branch point", "branches of limit cycles cross"),
+        "GR": ("grazing", "the limit cycle touches a stop without speed"),
+        GRAZING_SLIDING: (GRAZING_SLIDING, "sticking begins or ends, and the branch may turn"),
+        HOPF: ("Hopf point", "the limit cycle has shrunk to rest"),
+    }[special.kind]
+    title = name[0].upper() + name[1:]
+    return NormalForm(name, f"{title} at {special.place(9)}: {meaning}.")
 
 
 def _of_event(special: SpecialPoint) -> str:

@@ -2,28 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from nldyn.base.errors import ConvergenceError
 from nldyn.bifurcations.point import BranchNode, node_of
 from nldyn.orbits.bordered import Condition, OrbitFamily, correct, gradient, tangent_surface
 from nldyn.orbits.orbit import Orbit
-from nldyn.orbits.self_excited import samples
-from nldyn.system.chart import FREQUENCY, Chart
-from nldyn.system.parameters import Parameter
 
-WIDEST = 1e3  # of the frequencies of self-excited motions, on either side of the first one
 CROSSES_END = 1e-3  # component of a unit tangent that leads to or from the end of a range
-
-
-def of_self_excited(orbit: Orbit, chart: Chart) -> OrbitFamily:
-    """The family of a self-excited motion in a parameter, whose frequency goes along."""
-    hz = orbit.frequency_hz
-    found = Chart(Parameter(FREQUENCY), hz / WIDEST, hz * WIDEST)
-    size = float(np.linalg.norm(samples(orbit.trajectory), axis=1).max())
-    return replace(OrbitFamily.around(orbit, (chart, found)), least=size)
 
 
 def start_on(family: OrbitFamily, orbit: Orbit, condition: Condition) -> BranchNode:

@@ -24,13 +24,14 @@ from nldyn.bifurcations.point import BranchNode, SpecialPoint
 from nldyn.branches.at_frequency import check_requested, requested
 from nldyn.branches.branch import Branch, Course
 from nldyn.branches.checkpoint import BranchFile, Checkpoint, checkpoint_at
-from nldyn.branches.conditioned import of_self_excited, start_on
+from nldyn.branches.conditioned import start_on
 from nldyn.branches.endings import Ending, StopReason, StopReasons
 from nldyn.branches.leg import Leg, LegBuilder, Progress
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.bordered import FREE, OrbitFamily, Place, correct
 from nldyn.orbits.conditions import Turning
+from nldyn.orbits.limit_cycle import of_self_excited
 from nldyn.orbits.orbit import Orbit, check_minimal
 from nldyn.orbits.shooting import shifts
 from nldyn.runtime.prefetch import Ahead
@@ -157,12 +158,8 @@ def continue_branch(
             )
         family = family_over(start, limits, parameter)
         avoided = alike(family, [numbers("open_ends", end) for end in open_ends])
-        further = tuple((other.low, other.high) for other in family.charts[1:])
-        before = Course(limits, ContinuationOptions(), avoided, further=further)
-        if start.self_excited:
-            first = start_on(family, start, Turning())
-        else:
-            first = start_point(family.place(start), 1.0)
+        before = Course(limits, ContinuationOptions(), avoided, further=further_ranges(family))
+        first = first_point(family, start)
     chart = first.family.charts[0]
     course = replace(
         before,
@@ -200,6 +197,18 @@ def family_over(
             "the frequency of a self-excited motion is found, not given: name another parameter"
         )
     return of_self_excited(orbit, chart)
+
+
+def first_point(family: OrbitFamily, orbit: Orbit) -> BranchNode:
+    """Where the branch of an orbit begins, heading up in the parameter; see `start_point`."""
+    if orbit.self_excited:
+        return start_on(family, orbit, Turning())
+    return start_point(family.place(orbit), 1.0)
+
+
+def further_ranges(family: OrbitFamily) -> tuple[tuple[float, float], ...]:
+    """Values of what goes along with the parameter, between which to stay."""
+    return tuple((other.low, other.high) for other in family.charts[1:])
 
 
 def going_on(

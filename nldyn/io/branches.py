@@ -62,16 +62,16 @@ def save_branches(path: str | Path, branches: Sequence[Branch], tally: Tally | N
 
 def save_diagram(path: str | Path, diagram: Diagram) -> None:
     """Write a diagram with its branches to one file, whole or not at all."""
-    _write(path, diagram.branches, _of_diagram(diagram))
+    _write(path, diagram.branches, of_diagram(diagram))
 
 
 def save_exploration(path: str | Path, found: Exploration) -> None:
     """Write an exploration to one file, whole or not at all."""
     diagram = found.diagram
-    _write(path, diagram.branches, _of_diagram(diagram), found)
+    _write(path, diagram.branches, of_diagram(diagram), found)
 
 
-def _of_diagram(diagram: Diagram) -> dict[str, Any]:
+def of_diagram(diagram: Diagram) -> dict[str, Any]:
     """What a diagram has beside its branches; of an axis that is not the frequency, that too."""
     about: dict[str, Any] = {"limits": diagram.limits, "observe": diagram.observe}
     about["notes"] = diagram.notes
@@ -116,7 +116,7 @@ def load_diagram(path: str | Path, *, laws: Laws | None = None) -> Diagram:
     with opened(path, FORMAT, FORMAT_VERSION) as root:
         if not _is_diagram(root):
             raise SystemModelError(f"{path}: holds branches without a diagram")
-        return _read_diagram(root, _read_flows(root, laws))
+        return read_diagram(root, _read_branches(root, _read_flows(root, laws)))
 
 
 def load_exploration(path: str | Path, *, laws: Laws | None = None) -> Exploration:
@@ -125,7 +125,7 @@ def load_exploration(path: str | Path, *, laws: Laws | None = None) -> Explorati
         if "exploration" not in root:
             raise SystemModelError(f"{path}: holds no exploration")
         flows = _read_flows(root, laws)
-        diagram = _read_diagram(root, flows)
+        diagram = read_diagram(root, _read_branches(root, flows))
         question, stage = _read_exploration(root.group("exploration"), flows, diagram)
         return Exploration(diagram, question, stage)
 
@@ -314,9 +314,9 @@ def _read_branches(root: Group, flows: Sequence[FlowMap]) -> list[Branch]:
     return [_read_branch(group, flows) for group in root.group("branches").groups()]
 
 
-def _read_diagram(root: Group, flows: Sequence[FlowMap]) -> Diagram:
+def read_diagram(root: Group, branches: Sequence[Branch]) -> Diagram:
+    """The diagram that has these branches, from what a file has beside them."""
     limits, observe = _limits(root), root.text("observe")
-    branches = tuple(_read_branches(root, flows))
     parameter, held = THE_FREQUENCY, None
     if root.has_attribute("parameter"):
         parameter = Parameter(root.text("parameter"), root.whole("index"))
@@ -324,7 +324,7 @@ def _read_diagram(root: Group, flows: Sequence[FlowMap]) -> Diagram:
             raise root.fault("attribute", "parameter", f"is unknown: '{parameter.name}'")
     if root.has_attribute("frequency_hz"):
         held = root.number("frequency_hz")
-    return Diagram(branches, limits, observe, tuple(root.texts("notes")), parameter, held)
+    return Diagram(tuple(branches), limits, observe, tuple(root.texts("notes")), parameter, held)
 
 
 def _flow_of(group: Group, flows: Sequence[FlowMap]) -> FlowMap:

@@ -10,7 +10,7 @@ Datasets carry their unit as the attribute ``unit``.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from nldyn.branches.tables import UNITS
 from nldyn.curves.backbone import Backbone
 from nldyn.curves.curves import Curve
 from nldyn.flow.flow_map import FlowMap
-from nldyn.io.branches import read_course, write_course
+from nldyn.io.branches import of_diagram, read_course, read_diagram, write_course
 from nldyn.io.flow import STATE_UNIT, Laws, checked_laws, read_flow, write_flow
 from nldyn.io.hdf5 import Group, new_file, opened, put, set_attribute
 from nldyn.orbits.bordered import FREE, Condition, Evaluation, OrbitFamily
@@ -44,6 +44,7 @@ from nldyn.orbits.conditions import (
 )
 from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.shooting import ShootingProblem
+from nldyn.search.diagram import Diagram
 from nldyn.system.chart import FREQUENCY, Chart, checked_parameter
 from nldyn.system.chart import UNITS as PARAMETER_UNITS
 from nldyn.system.parameters import Parameter
@@ -57,7 +58,9 @@ HELD = 1e-6  # how far the held quantity of a loaded curve may be off
 OwnMonitor = Callable[[Orbit], float]
 
 
-def save_curves(path: str | Path, curves: Sequence[Curve]) -> None:
+def save_curves(
+    path: str | Path, curves: Sequence[Curve], attributes: Mapping[str, Any] | None = None
+) -> None:
     """Write curves to one file, whole or not at all.
 
     Parameters
@@ -66,6 +69,8 @@ def save_curves(path: str | Path, curves: Sequence[Curve]) -> None:
         The file.
     curves : sequence of Curve
         What to write.
+    attributes : mapping, optional
+        What the file has beside them.
 
     Raises
     ------
@@ -77,13 +82,19 @@ def save_curves(path: str | Path, curves: Sequence[Curve]) -> None:
     if not isinstance(curves, list | tuple) or not all(isinstance(c, Curve) for c in curves):
         raise SystemModelError(f"curves must be a list of curves, got {shown(curves)}")
     with new_file(path, FORMAT, FORMAT_VERSION) as file:
+        for key, value in (attributes or {}).items():
+            set_attribute(file, key, value)
         groups = file.create_group("curves")
         for number, curve in enumerate(curves):
             _write_curve(groups.create_group(f"{number:04d}"), curve)
 
 
-def save_self_excited(path: str | Path, branches: Sequence[Branch]) -> None:
+def save_self_excited(
+    path: str | Path, branches: Sequence[Branch], diagram: Diagram | None = None
+) -> None:
     """Write branches of self-excited motions, whose frequency goes along, as curves.
+
+    Those of a diagram with what that has beside them.
 
     Raises
     ------
@@ -96,7 +107,8 @@ def save_self_excited(path: str | Path, branches: Sequence[Branch]) -> None:
         raise SystemModelError(
             "branches of self-excited motions and of others are saved to files of their own"
         )
-    save_curves(path, [Curve(SELF_EXCITED, branch) for branch in branches])
+    curves = [Curve(SELF_EXCITED, branch) for branch in branches]
+    save_curves(path, curves, None if diagram is None else of_diagram(diagram))
 
 
 def is_self_excited(branch: Branch) -> bool:
@@ -133,6 +145,13 @@ def load_curves(
     with opened(path, FORMAT, FORMAT_VERSION) as root:
         groups = root.group("curves").groups()
         return [_read_curve(group, known, monitor) for group in groups]
+
+
+def load_self_excited(path: str | Path, *, laws: Laws | None = None) -> Diagram:
+    """Read a diagram of self-excited motions."""
+    found = load_curves(path, laws=laws)
+    with opened(path, FORMAT, FORMAT_VERSION) as root:
+        return read_diagram(root, [each for each in found if isinstance(each, Branch)])
 
 
 def _as_branch(curve: Curve) -> Branch:

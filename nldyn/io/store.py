@@ -22,6 +22,7 @@ from nldyn.io.branches import (
 from nldyn.io.curves import (
     is_self_excited,
     load_curves,
+    load_self_excited,
     save_backbone,
     save_curves,
     save_self_excited,
@@ -67,6 +68,8 @@ def save(result: Result | Sequence[Branch] | Sequence[Curve], path: str | Path) 
     """
     if isinstance(result, Exploration):
         save_exploration(path, result)
+    elif isinstance(result, Diagram) and any(map(is_self_excited, result.branches)):
+        save_self_excited(path, result.branches, result)
     elif isinstance(result, Diagram):
         save_diagram(path, result)
     elif isinstance(result, Branch):
@@ -133,6 +136,8 @@ def load(
     nldyn.base.errors.SystemModelError: nowhere.h5: there is no such file
     """
     format_, holds = kind_of(path)
+    if format_ == curve_files.FORMAT and holds.intersection(branch_files.LIMITS):
+        return load_self_excited(path, laws=laws)
     if format_ == curve_files.FORMAT:
         return load_curves(path, laws=laws, monitor=monitor)
     if format_ != branch_files.FORMAT:

@@ -14,6 +14,7 @@ from nldyn.base.errors import SystemModelError, check_frequency
 from nldyn.flow.flow_map import FlowMap, same_flow
 from nldyn.flow.rigid import before_rigid_stops
 from nldyn.orbits.bordered import SAME_FREQUENCY, OrbitFamily, Place
+from nldyn.orbits.limit_cycle import of_self_excited
 from nldyn.orbits.orbit import Orbit, stroboscopic
 from nldyn.orbits.shooting import ShootingProblem
 from nldyn.system.chart import (
@@ -42,7 +43,8 @@ class Axis:
     chart : Chart
         The parameter and its range.
     frequency_hz : float, optional
-        Excitation frequency in Hz, held; None where it changes.
+        Excitation frequency in Hz, held; None where it changes, and where nothing excites the
+        motions, whose frequencies are found.
     """
 
     chart: Chart
@@ -62,21 +64,27 @@ class Axis:
         ------
         SystemModelError
             If there is no such parameter, it cannot have these values, or the frequency is given
-            where it changes or missing where it does not.
+            where it changes or is found, or missing where it is neither.
         """
         chosen = checked_parameter(system, FREQUENCY if parameter is None else parameter)
         name = parameter_name(chosen)
+        given = moves_frequency(chosen) or frequency_hz is not None
+        if given and system.carried and not system.driven:
+            raise SystemModelError(
+                "nothing excites the system but what moves beneath its friction: its frequency is "
+                "found, not given; name another parameter, and no frequency_hz"
+            )
         if moves_frequency(chosen):
             if frequency_hz is not None:
                 raise SystemModelError(
                     f"frequency_hz is what parameter '{name}' changes: give it with another one"
                 )
-        elif frequency_hz is None:
+        elif frequency_hz is not None:
+            check_frequency("frequency_hz", frequency_hz)
+        elif system.driven:
             raise SystemModelError(
                 f"parameter '{name}': needs frequency_hz, the excitation frequency that is held"
             )
-        else:
-            check_frequency("frequency_hz", frequency_hz)
         return cls(Chart.of(chosen, limits), frequency_hz)
 
     @classmethod
@@ -88,6 +96,11 @@ class Axis:
     def parameter(self) -> Parameter:
         """What changes."""
         return self.chart.parameter
+
+    @property
+    def self_excited(self) -> bool:
+        """Whether nothing excites the motions, whose frequencies are found."""
+        return self.frequency_hz is None and not moves_frequency(self.parameter)
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -108,7 +121,10 @@ class Axis:
 
     def family(self, flow: FlowMap, orbit: Orbit) -> OrbitFamily:
         """The family along the axis that an orbit belongs to, in the coordinates of a system."""
-        family = OrbitFamily.around(orbit, (self.chart,))
+        if self.self_excited:
+            family = of_self_excited(orbit, self.chart)
+        else:
+            family = OrbitFamily.around(orbit, (self.chart,))
         return replace(family, problem=replace(orbit.problem, flow=flow))
 
     def is_along(self, place: Place) -> bool:
@@ -116,7 +132,8 @@ class Axis:
         charts, held = place.family.charts, self.frequency_hz
         hz = place.orbit.frequency_hz
         same_hz = held is None or math.isclose(hz, held, rel_tol=SAME_FREQUENCY)
-        return same_hz and [chart.parameter for chart in charts] == [self.parameter]
+        followed = [self.parameter, *[THE_FREQUENCY] * self.self_excited]
+        return same_hz and [chart.parameter for chart in charts] == followed
 
     def is_of(self, flow: FlowMap, other: FlowMap) -> bool:
         """Whether two flow maps are one but for the value of the parameter."""
@@ -233,7 +250,18 @@ class Section:
 
     @property
     def frequency_hz(self) -> float:
-        """Excitation frequency in Hz."""
+        """Excitation frequency in Hz.
+
+        Raises
+        ------
+        SystemModelError
+            If nothing excites the system.
+        """
+        if self.axis.self_excited:
+            raise SystemModelError(
+                "nothing excites the system, whose motions have frequencies of their own: find "
+                "them by limit_cycle, continue_branch or diagram"
+            )
         return self.value if self.axis.frequency_hz is None else self.axis.frequency_hz
 
     @property

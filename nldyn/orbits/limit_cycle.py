@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, check_frequency, numbers
 from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.orbits.bordered import OrbitFamily
 from nldyn.orbits.newton import spread
 from nldyn.orbits.orbit import Orbit, check_observe
+from nldyn.orbits.self_excited import samples
 from nldyn.orbits.shooting import ShootingProblem, shooting_problem
+from nldyn.system.chart import THE_FREQUENCY, Chart
 from nldyn.system.equilibrium import at_rest, rest
 from nldyn.system.system import System
 
@@ -21,6 +25,7 @@ MOST_TURNS = 30  # largest displacements in one cycle of a limit cycle
 STILL = 1e-8  # way of a state, relative to it, that is rounding
 SAME = 1e-6  # distance of two states, relative to the motion, that are one
 COMES_BACK = 1e-2  # distance of a state from itself a cycle later, relative to the motion
+WIDEST = 1e3  # of the frequencies of a family, on either side of the first one
 NO_LONGER = 3.0  # times the shortest distance: a cycle that is run through once
 
 
@@ -89,10 +94,10 @@ def limit_cycle(
         check_frequency("frequency_hz", frequency_hz)
     problem = shooting_problem(flow, 1, segments)
     state, omega = _repeated(flow, _start(flow, start), _unit_of_time(flow, frequency_hz), name)
-    return solved(problem, state, omega, name)
+    return limit_cycle_near(problem, state, omega, name)
 
 
-def solved(problem: ShootingProblem, state: Real, omega: float, observe: str) -> Orbit:
+def limit_cycle_near(problem: ShootingProblem, state: Real, omega: float, observe: str) -> Orbit:
     """The limit cycle near a state (2n,) at which the observed displacement turns."""
     guess = np.append(spread(problem, state, omega).ravel(), math.log(omega))
     row = np.zeros(guess.size)
@@ -109,6 +114,14 @@ def solved(problem: ShootingProblem, state: Real, omega: float, observe: str) ->
             "lead to one"
         )
     return orbit
+
+
+def of_self_excited(orbit: Orbit, chart: Chart) -> OrbitFamily:
+    """The family of a self-excited motion in a parameter, whose frequency goes along."""
+    hz = orbit.frequency_hz
+    found = Chart(THE_FREQUENCY, hz / WIDEST, hz * WIDEST)
+    size = float(np.linalg.norm(samples(orbit.trajectory), axis=1).max())
+    return replace(OrbitFamily.around(orbit, (chart, found)), least=size)
 
 
 def _check_self_excited(system: System) -> None:
@@ -148,7 +161,7 @@ def _unit_of_time(flow: FlowMap, frequency_hz: float | None) -> float:
 
 
 def _repeated(flow: FlowMap, state: Real, omega: float, observe: str) -> tuple[Real, float]:
-    """State at the last maximum of a simulation, and the rate at which it comes back there."""
+    """State at the highest maximum of the last cycle of a simulation, and the rate of cycles."""
     warm = flow.strobe(state, omega, TRANSIENT)
     if warm.failure:
         raise ConvergenceError(f"the simulation failed: {warm.failure}; give another start")
@@ -157,8 +170,8 @@ def _repeated(flow: FlowMap, state: Real, omega: float, observe: str) -> tuple[R
     if motion.failure:
         raise ConvergenceError(f"the simulation failed: {motion.failure}; give another start")
     tops = motion.extremes(flow.system.output(observe))
-    tops = np.sort(tops[tops[:, 2] > 0.0, 0])
-    inside = tops[(tops > 0.0) & (tops < phases[-1])]
+    tops = tops[(tops[:, 2] > 0.0) & (tops[:, 0] > 0.0) & (tops[:, 0] < phases[-1])]
+    inside, heights = tops[np.argsort(tops[:, 0]), :2].T
     states = motion.states(inside)
     size = float(np.ptp(states, axis=0).max(initial=0.0)) if len(states) else 0.0
     whole = motion.states(np.linspace(0.0, phases[-1], 200))
@@ -177,4 +190,5 @@ def _repeated(flow: FlowMap, state: Real, omega: float, observe: str) -> tuple[R
         )
     back = int(np.flatnonzero(away <= max(NO_LONGER * away.min(), SAME * size))[0]) + 2
     period = float(inside[-1] - inside[-back]) / omega
-    return states[-1], 2.0 * math.pi / period
+    highest = int(np.argmax(heights[1 - back :])) + 1 - back
+    return states[highest], 2.0 * math.pi / period

@@ -80,9 +80,9 @@ def solve_orbit(
     SystemModelError
         For input that makes no sense.
     ConvergenceError
-        If nothing excites and nothing damps the system, if the simulation fails, if Newton's
-        method does not converge or comes to an orbit of a shorter period, or if the time is
-        spent; the text says why.
+        If nothing excites the system and nothing damps it, or only what moves beneath friction
+        moves it; if the simulation fails, if Newton's method does not converge or comes to an orbit
+        of a shorter period, or if the time is spent; the text says why.
 
     Examples
     --------
@@ -106,6 +106,11 @@ def solve_orbit(
             "nothing excites the system and nothing damps it, so that its free motions are a "
             "family over the energy and none of them stands alone: give excitation or damping, or "
             "follow the family by backbone"
+        )
+    if flow.system.carried and not flow.system.driven:
+        raise ConvergenceError(
+            "nothing excites the system but what moves beneath its friction, so that no period is "
+            "given: find its motion, with the frequency, by limit_cycle"
         )
     if guess is not None:
         return first_orbit(problem, [guessed_nodes(problem, guess, omega)], omega, observe)

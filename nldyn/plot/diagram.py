@@ -39,7 +39,7 @@ from nldyn.system.naming import stop_name
 from nldyn.system.round_stop import RoundStop
 
 if TYPE_CHECKING:
-    from nldyn.bifurcations.point import SpecialPoint
+    from nldyn.bifurcations.point import BranchNode, SpecialPoint
     from nldyn.branches.branch import Branch
     from nldyn.orbits.orbit import Orbit
     from nldyn.search.diagram import Diagram
@@ -121,13 +121,18 @@ def branch_curve(
         special point counts as stable if a neighbour is, so that the drawn stability changes at the
         special point itself.
     """
-    located = [(node, node.orbit.stable) for node in branch.nodes]
-    for special in branch.special_points:
-        located.append((special.point, beside_stable(branch, special)))
-    located.sort(key=lambda entry: entry[0].arclength)
+    located = _located(branch)
     x = np.array([node.value for node, _ in located], dtype=float)
     y = np.array([node.orbit.max_abs_displacement for node, _ in located], dtype=float)
     return x, y, np.array([stable for _, stable in located], dtype=bool)
+
+
+def _located(branch: Branch) -> list[tuple[BranchNode, bool]]:
+    """Points and special points in order along a branch, and how each counts; a place once."""
+    special = [(each.point, beside_stable(branch, each)) for each in branch.special_points]
+    taken = {point.arclength for point, _ in special}
+    nodes = [(node, node.orbit.stable) for node in branch.nodes if node.arclength not in taken]
+    return sorted([*nodes, *special], key=lambda entry: entry[0].arclength)
 
 
 def beside_stable(branch: Branch, special: SpecialPoint) -> bool:
@@ -159,6 +164,16 @@ def period_name(period: int) -> str:
     return "harmonic" if period == 1 else f"1/{period} subharmonic"
 
 
+def branch_kind(branch: Branch) -> str:
+    """What a branch is called in a legend."""
+    return "limit cycle" if are_limit_cycles([branch]) else period_name(branch.period)
+
+
+def are_limit_cycles(branches: Sequence[Branch]) -> bool:
+    """Whether branches are those of self-excited motions."""
+    return bool(branches) and getattr(branches[0].nodes[0].orbit, "self_excited", False)
+
+
 def orbit_title(orbit: Orbit, digits: int = 6) -> str:
     """Say of an orbit whether it is stable, its period and its frequency.
 
@@ -170,7 +185,8 @@ def orbit_title(orbit: Orbit, digits: int = 6) -> str:
     >>> orbit_title(solve_orbit(system, frequency_hz=10.0))
     'stable harmonic orbit at 10 Hz'
     """
-    name = f"{orbit.stability.verdict} {period_name(orbit.period)} orbit"
+    what = "limit cycle" if orbit.self_excited else f"{period_name(orbit.period)} orbit"
+    name = f"{orbit.stability.verdict} {what}"
     return f"{name} at {orbit.frequency_hz:.{digits}g} Hz"
 
 
@@ -265,6 +281,27 @@ def plot_diagram(
         draw_legend(ax, colours, branches, marked, lines)
     if hover:
         _label_orbits(ax, branches, marked, along, factor, unit)
+    return ax
+
+
+def plot_frequency(diagram: Diagram, ax: Axes) -> Axes:
+    """Draw the frequencies of self-excited motions against the parameter of a diagram."""
+    along = followed(diagram.branches)
+    for branch in diagram.branches:
+        places, stable = zip(*_located(branch), strict=True)
+        x = np.array([place.value for place in places]) / along.factor
+        hz = np.array([place.orbit.frequency_hz for place in places])
+        for run in stability_runs(stable):
+            part = slice(run.start, run.stop)
+            style = STABLE if run.stable else UNSTABLE
+            ax.plot(x[part], hz[part], color=PERIOD_COLOURS[0], linewidth=1.4, linestyle=style)
+    kinds = dict.fromkeys(s.kind for branch in diagram.branches for s in branch.special_points)
+    for kind, points in marked_points(diagram.branches, kinds).items():
+        at = [point.value / along.factor for point in points]
+        ax.plot(at, [point.orbit.frequency_hz for point in points], **mark_style(kind))
+    ax.set_xlabel(along.label)
+    ax.set_ylabel("frequency (Hz)")
+    ax.ticklabel_format(axis="y", useOffset=False)
     return ax
 
 
@@ -408,8 +445,17 @@ def save_diagram(
     direction: str = "",
     yscale: Literal["linear", "log"] = "linear",
 ) -> None:
-    """Write ``diagram.png`` and ``diagram.svg`` to a directory that exists."""
-    ax = plot_diagram(diagram, file_axes(), direction=direction, yscale=yscale)
+    """Write ``diagram.png`` and ``diagram.svg`` to a directory that exists.
+
+    Of self-excited motions the frequency stands below.
+    """
+    if are_limit_cycles(diagram.branches):
+        ax, below = file_figure(10.5, 8.0).subplots(2, 1, sharex=True, height_ratios=[2, 1])
+        plot_frequency(diagram, below)
+    else:
+        ax = file_axes()
+    plot_diagram(diagram, ax, direction=direction, yscale=yscale)
+    ax.label_outer()
     ax.set_title(title, parse_math=False)
     save_figure(ax, Path(directory) / "diagram")
 
@@ -555,8 +601,8 @@ def draw_legend(
     others: Sequence[Line2D] = (),
 ) -> None:
     """Explain colours, lines and the special points that are marked, and then other lines."""
-    periods = sorted({branch.period for branch in branches})
-    entries = [Line2D([], [], color=colours[p], label=period_name(p)) for p in periods]
+    named = {branch.period: branch_kind(branch) for branch in branches}
+    entries = [Line2D([], [], color=colours[p], label=named[p]) for p in sorted(named)]
     entries += [
         Line2D([], [], color="0.3", linestyle=STABLE, label="stable"),
         Line2D([], [], color="0.3", linestyle=UNSTABLE, label="unstable"),

@@ -138,7 +138,7 @@ def computed_before(
         kept = as_diagram(found)
     except (OSError, KeyError, OutputError, SystemModelError):
         return None
-    if not kept.branches or not same_system(kept.branches[0].points[0].system, system):
+    if not kept.branches or not same_system(kept.branches[0].nodes[0].family.system, system):
         return None
     return found if isinstance(found, Exploration) else kept
 

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from nldyn.plot.diagram import branch_curve, stability_runs
+from nldyn.bifurcations.self_excited import GRAZING_SLIDING
+from nldyn.plot.diagram import are_limit_cycles, branch_curve, stability_runs
 from nldyn.plot.words import FORCES, Along, unit_in
 from nldyn.system.naming import slider_name, stop_name
 
@@ -48,13 +49,15 @@ def answer_lines(diagram: Diagram, special_points: Table) -> list[str]:
     stable = joined(stable_ranges(diagram.branches), diagram.limits)
     between = gaps(stable, diagram.limits)
     unstable = _listed(between, along) if between else "none"
+    found = "no stable limit cycle" if are_limit_cycles(diagram.branches) else "nothing stable"
     return [
         _peak_line(nodes, along, diagram.observe),
+        *([_frequency_line(nodes, along)] if are_limit_cycles(diagram.branches) else []),
         *_contact_lines(nodes, along),
         *_area_lines(nodes, along),
         *_friction_lines(nodes, along),
         f"stable and periodic: {_listed(stable, along)}",
-        f"ranges where nothing stable was found: {unstable}",
+        f"ranges where {found} was found: {unstable}",
         f"jumps: {jumps_line(diagram.branches, special_points, along)}",
     ]
 
@@ -69,6 +72,13 @@ def _peak_line(nodes: Sequence[BranchNode], along: Along, observe: str) -> str:
 
     line = f"largest {'rotation' if measure == 'rad' else 'displacement'} of '{observe}': "
     return line + _of_stable_and_all(nodes, lambda node: node.orbit.max_abs_displacement, told)
+
+
+def _frequency_line(nodes: Sequence[BranchNode], along: Along) -> str:
+    """Between which frequencies self-excited motions lie."""
+    ends = [pick(nodes, key=lambda node: node.orbit.frequency_hz) for pick in (min, max)]
+    told = [f"{node.orbit.frequency_hz:.6g} Hz at {along.told(node.value)}" for node in ends]
+    return f"frequency, found with the motion: {' to '.join(told)}"
 
 
 def _contact_lines(nodes: Sequence[BranchNode], along: Along) -> list[str]:
@@ -158,7 +168,8 @@ def _friction_lines(nodes: Sequence[BranchNode], along: Along) -> list[str]:
         most = max(range(len(found)), key=lambda number: found[number].loss)
         place = f", {slider_name(system, most)}" if len(found) > 1 else ""
         factor, unit = unit_in("J", loss(node))
-        lost = f"{loss(node) / factor:.4g} {unit} per excitation period"
+        period = "period" if node.orbit.self_excited else "excitation period"
+        lost = f"{loss(node) / factor:.4g} {unit} per {period}"
         return f"{lost} at {along.told(node.value)}{place}"
 
     name = "largest loss by friction"
@@ -249,7 +260,8 @@ def jumps_line(branches: Iterable[Branch], special_points: Table, along: Along) 
             inner, outer = (before, after) if stable[before] else (after, before)
             kind, form = ends[float(x[at])]
             turns = (x[at] - x[inner]) * (x[outer] - x[at]) < 0.0
-            if kind == "LP" or form.startswith("subcritical") or (kind == "GR" and turns):
+            folds = kind == "LP" or (turns and kind in ("GR", GRAZING_SLIDING))
+            if folds or form.startswith("subcritical"):
                 (rising if x[inner] < x[at] else falling).add(float(x[at]))
     told = [
         f"as the {along.noun} {word} past {_few(sorted(places), along)}"

@@ -16,11 +16,14 @@ from nldyn.bifurcations.kinds import KINDS, title_of
 from nldyn.branches.branch import Branch
 from nldyn.plot.diagram import (
     MANY_MARKS,
+    are_limit_cycles,
     beside_stable,
     branch_curve,
+    branch_kind,
+    file_figure,
     orbit_text,
     period_colours,
-    period_name,
+    plot_frequency,
     stability_runs,
     stop_places,
 )
@@ -45,6 +48,8 @@ from nldyn.system.chart import THE_FREQUENCY, parameter_name
 from nldyn.system.naming import is_angle
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     import cms
     from fem.render import StopSphere
     from fem.render.pictures import AnyComponent
@@ -155,6 +160,8 @@ def write_page(
         "friction": friction_columns(branches[0].points[0]) if branches else [],
         "orbits": orbits,
         "contact": png_of(contact_figure(diagram, scene)),
+        "frequency": png_of(frequency_figure(diagram)),
+        "period": "period" if are_limit_cycles(branches) else "excitation period",
         "tables": {
             "special points": special_table(tables["special_points"], along, factor, unit),
             "branches": branch_table(branches, tables, along),
@@ -172,6 +179,15 @@ def write_page(
             if "fault" not in shown:
                 shown["motion"] = modal_motion(each.orbit)
     write_html(path, "page.html", content)
+
+
+def frequency_figure(diagram: Diagram) -> Figure | None:
+    """The frequencies of self-excited motions along their branches; None of others."""
+    if not are_limit_cycles(diagram.branches):
+        return None
+    figure = file_figure(9.0, 3.0)
+    plot_frequency(diagram, figure.add_subplot())
+    return figure
 
 
 def told_frequency(diagram: Diagram) -> str:
@@ -236,6 +252,7 @@ class ToldBranch:
     period: int
     nodes: list[ToldPoint]
     special_points: list[ToldSpecial]
+    kind: str
 
 
 def told_branches(diagram: Diagram, tables: Mapping[str, Table]) -> list[ToldBranch]:
@@ -269,8 +286,8 @@ def told_branches(diagram: Diagram, tables: Mapping[str, Table]) -> list[ToldBra
             )
             for each, row in zip(branch.special_points, special, strict=False)
         ]
-        name = branch.name or period_name(branch.period)
-        found.append(ToldBranch(name, branch.period, nodes, marks))
+        kind = branch_kind(branch)
+        found.append(ToldBranch(branch.name or kind, branch.period, nodes, marks, kind))
     return found
 
 
@@ -346,7 +363,7 @@ def drawn_branches(
             {
                 "name": branch.name,
                 "period": branch.period,
-                "period_name": period_name(branch.period),
+                "period_name": branch.kind,
                 "colour": colours[branch.period],
                 "runs": runs,
                 "numbers": list(numbers),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem.render.gl import missing_library
-from nldyn.base.errors import SceneError
+from nldyn.base.errors import ConvergenceError, SceneError, SystemModelError
 from nldyn.plot.diagram import orbit_title
 from nldyn.report.again import drawn_of
 from nldyn.report.modes import check_modes, mode_table
@@ -23,7 +23,9 @@ from nldyn.runtime.progress import Progress, Shares, silent
 from nldyn.runtime.result_directory import result_directory
 from nldyn.scene.build import Structure, build_structure, build_system
 from nldyn.scene.checks import check_computable
+from nldyn.scene.faults import told_as
 from nldyn.scene.messages import scene_error
+from nldyn.scene.simulation import start_of
 
 if TYPE_CHECKING:
     import cms
@@ -167,13 +169,16 @@ def orbit_to_draw(
 ) -> Orbit:
     """Find the orbit to draw: at a frequency, or where the stable harmonic orbits are largest.
 
-    Where none is stable, the largest of all.
+    Where none is stable, the largest of all; where nothing excites the structure, the limit cycle.
     """
-    from nldyn.base.errors import ConvergenceError
+    from nldyn.orbits.limit_cycle import limit_cycle
     from nldyn.orbits.solve import solve_orbit
     from nldyn.search.diagram import diagram
 
     assert scene.continuation is not None
+    if scene.self_excited and frequency_hz is None:
+        with told_as(scene, (), SystemModelError, ConvergenceError):
+            return limit_cycle(system, start_of(scene, system))
     frequency_hz = frequency_hz or scene.continuation.frequency_hz
     if frequency_hz is not None:
         try:

@@ -93,7 +93,8 @@ def basins_of(
     flow = build_flow(scene)
     name = first_interface(flow.system)
     x, y = x or ("displacement", name), y or ("velocity", name)
-    axis = None if frequency_hz is not None else axis_of(scene, flow.system)
+    given = frequency_hz is not None and not scene.self_excited
+    axis = None if given else axis_of(scene, flow.system)
     with told_as(scene, (), SystemModelError), own_processes(jobs) as executor:
         values = [] if axis is None else values_over(flow, axis, over)
         cases = _cases(flow, axis, values, frequency_hz)

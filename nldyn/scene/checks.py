@@ -22,7 +22,6 @@ from nldyn.system.system import NOT_HELD, System
 SOUND = (10.0, 3e4)  # speeds in m/s, below those of soft rubber and above that of diamond
 
 Report = Callable[[KeyPath, str], SceneError]
-STEADY = ("constant", "weight")  # kinds of loads that do not change in time
 MANY_OSCILLATIONS = 1000.0  # in a period: 1700 take four times as long as 170
 LONGEST_NAME, LONGEST_TITLE = 100, 1000
 NAMED_BY = (
@@ -105,11 +104,21 @@ def _check_known(scene: Scene, mesh: TaggedMesh, file: Path) -> None:
 
 
 def check_computable(scene: Scene, file: Path) -> None:
-    """Check that the scene says what excites the structure and which range to follow."""
-    if not any(table.kind not in STEADY for table in scene.excitation):
+    """Check that the scene says what excites the structure and which range to follow.
+
+    Motions that excite themselves are followed over a parameter.
+    """
+    if scene.self_excited:
+        _check_self_excited(scene, file)
+    elif not scene.driven:
         fault = "is missing: nothing moves the structure"
         if scene.excitation:
             fault = "is constant: there is no branch to follow, but 'nldyn simulate' takes it"
+        if any(table.base_speed for table in scene.friction):
+            fault += (
+                "; motions that excite themselves are followed over the 'range' of a 'parameter' "
+                "of [continuation], such as 'friction.0.base_speed'"
+            )
         raise scene_error(file, ("excitation",), fault)
     for number, table in enumerate(scene.excitation):
         if not table.periodic:
@@ -122,12 +131,23 @@ def check_computable(scene: Scene, file: Path) -> None:
         raise scene_error(file, ("continuation",), fault)
 
 
+def _check_self_excited(scene: Scene, file: Path) -> None:
+    """Refuse what counts periods of an excitation, or needs its frequency, where there is none."""
+    fault = "is of no use where nothing excites the structure, whose frequency is found; leave it"
+    assert scene.continuation is not None
+    for key in ("frequency_hz", "periods", "follow_doublings", "events"):
+        if key in scene.continuation.model_fields_set:
+            raise scene_error(file, ("continuation", key), f"{fault} out")
+    for table in ("subharmonics", "explore"):
+        if getattr(scene, table):
+            raise scene_error(file, (table,), f"{fault} out")
+
+
 def only_simulated(scene: Scene) -> bool:
     """Whether a scene is meant for ``nldyn simulate``: no range, and loads that have no period."""
-    steady = all(table.kind in STEADY for table in scene.excitation)
     several = any(not table.periodic for table in scene.excitation)
     begun = bool(scene.excitation) or scene.start is not None
-    return scene.continuation is None and begun and (steady or several)
+    return scene.continuation is None and begun and (several or not scene.driven)
 
 
 def check_held_to_follow(scene: Scene, system: System) -> None:
@@ -158,13 +178,13 @@ def _unknown_rides(scene: Scene) -> Iterator[str]:
 
 def _unused(scene: Scene) -> Iterator[str]:
     """Name what a search for branches passes over."""
-    if scene.start is not None and scene.continuation is not None:
+    if scene.start is not None and scene.continuation is not None and not scene.self_excited:
         yield "[start] is for 'nldyn simulate': branches do not depend on where a motion begins"
 
 
 def _slow_remarks(scene: Scene, system: System) -> Iterator[str]:
     """Name what makes a computation many times as long, or endless."""
-    if scene.continuation is None or system.left_free:
+    if scene.continuation is None or scene.self_excited or system.left_free:
         return
     if system.conservative:
         yield (
@@ -194,7 +214,7 @@ def _material_remarks(scene: Scene) -> Iterator[str]:
 
 def _range_remark(scene: Scene, highest_hz: float) -> str:
     """Say that the range goes beyond the modes that are kept; empty if it does not."""
-    if scene.reduction is None or scene.continuation is None:
+    if scene.reduction is None or scene.continuation is None or scene.self_excited:
         return ""
     top = scene.continuation.frequencies_hz[1]
     if top <= highest_hz:

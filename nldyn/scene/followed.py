@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nldyn.base.errors import SceneError, SystemModelError
-from nldyn.scene.checks import STEADY
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import KeyPath, scene_error, unknown_name
-from nldyn.scene.schema.scene import Scene
+from nldyn.scene.schema.scene import STEADY, Scene
 from nldyn.scene.stops_and_loads import slider_of, sources_before
 from nldyn.system.chart import EVERY_MODE, SPEED, SPIN, THE_FREQUENCY
 from nldyn.system.parameters import OF_STOPS, SHARED, SOURCES, Parameter
@@ -22,7 +21,7 @@ OF_LISTS = {  # the keys of each list of tables that may change
     "stops": OF_STOPS,
     "excitation": SOURCES,
     "dampers": ("coefficient",),
-    "friction": ("coefficient", "normal_force", "tangential_stiffness"),
+    "friction": ("coefficient", "normal_force", "tangential_stiffness", "base_speed"),
     "round_clearances": (*SHARED, "clearance", "friction", "eccentricity"),
     "contact_areas": ("gap", "stiffness", "friction"),
     "springs": ("stiffness", "coefficients"),

@@ -19,6 +19,7 @@ from nldyn.scene.faults import told_as
 from nldyn.scene.followed import axis_of
 from nldyn.scene.schema.computation import ContinuationTable
 from nldyn.scene.schema.scene import Scene
+from nldyn.scene.simulation import start_of
 from nldyn.search.diagram import Diagram, SubharmonicSeed, diagram
 from nldyn.search.exploration import Exploration, ExploreOptions
 from nldyn.search.explore import explore
@@ -41,7 +42,8 @@ def compute(
     Parameters
     ----------
     scene : Scene
-        A scene with an ``[[excitation]]`` and a ``[continuation]``.
+        A scene with a ``[continuation]``, and with an ``[[excitation]]`` or motions that excite
+        themselves.
     progress : callable, optional
         Called as ``progress(what, frequency_hz, done)`` at every orbit.
     checkpoint : CheckpointFile, optional
@@ -152,6 +154,7 @@ def results_of(
             axis.limits,
             table.periods,
             seeds=[SubharmonicSeed(seed.period, seed.place) for seed in scene.subharmonics],
+            start=start_of(scene, flow.system) if axis.self_excited else None,
             search_points=table.search_points,
             doublings=table.follow_doublings,
             **given,

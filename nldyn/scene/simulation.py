@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
 from nldyn.longterm.initial_states import state_with
 from nldyn.longterm.lyapunov import LyapunovSpectrum, lyapunov_exponents
@@ -11,6 +12,7 @@ from nldyn.longterm.simulation import Counted, Motion, simulate, sweep
 from nldyn.scene.build import build_flow
 from nldyn.scene.faults import told_as
 from nldyn.scene.schema.scene import Scene
+from nldyn.system.system import System
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,12 @@ class Simulation:
 
     motion: Motion
     spectrum: LyapunovSpectrum | None = None
+
+
+def start_of(scene: Scene, system: System) -> Real | None:
+    """The modal state (2n,) at which simulations of a scene begin, if it says one."""
+    with told_as(scene, ("start",), SystemModelError):
+        return None if scene.start is None else state_with(system, **scene.start.model_dump())
 
 
 def simulation_of(
@@ -78,8 +86,7 @@ def simulation_of(
     <Motion of 10 s>
     """
     flow = build_flow(scene)
-    with told_as(scene, ("start",), SystemModelError):
-        start = None if scene.start is None else state_with(flow.system, **scene.start.model_dump())
+    start = start_of(scene, flow.system)
     with told_as(scene, (), SystemModelError):
         if to_hz is None:
             motion = simulate(

@@ -18,17 +18,19 @@ from nldyn.branches.branch import Branch, Course
 from nldyn.branches.checkpoint import Checkpoint
 from nldyn.branches.continuation import (
     broken_off,
+    first_point,
+    further_ranges,
     going_on,
     leg_key,
     offer_branch,
     open_ends,
-    start_point,
     walked_leg,
 )
 from nldyn.branches.endings import Ending
 from nldyn.branches.step_control import ContinuationOptions
 from nldyn.flow.flow_map import FlowMap
 from nldyn.orbits.axis import Axis, Section
+from nldyn.orbits.limit_cycle import limit_cycle_near
 from nldyn.orbits.orbit import Orbit, minimal_period, stroboscopic
 from nldyn.orbits.solve import solve_orbit
 from nldyn.orbits.starts import orbit_near
@@ -69,7 +71,7 @@ class Collector:
 
     def _start_of(self, orbit: Orbit) -> BranchNode:
         """Where the branch of an orbit begins."""
-        return start_point(self.axis.family(self.flow, orbit).place(orbit), 1.0)
+        return first_point(self.axis.family(self.flow, orbit), orbit)
 
     def tell(self, what: str, value: float) -> None:
         """Say what is being computed."""
@@ -97,6 +99,8 @@ class Collector:
     def _add(self, branch: Branch) -> None:
         count = len(self.branches) + 1
         label = "harmonic" if branch.period == 1 else f"1/{branch.period}"
+        if self.axis.self_excited:
+            label = "limit cycle"
         named = replace(branch, name=f"{count:02d} {label}")
         self._keep(named)
         self.notes += [f"branch {named.name}: {note}" for note in named.notes]
@@ -197,7 +201,8 @@ class Collector:
 
     def _course(self, start: BranchNode, options: ContinuationOptions | None) -> Course:
         ends = self._open_ends_like(start).so_far()
-        return Course(self.axis.limits, options or self.options, ends)
+        further = further_ranges(start.family)
+        return Course(self.axis.limits, options or self.options, ends, further=further)
 
     def _is_within(self, orbit: Orbit) -> bool:
         return self.axis.holds(self.axis.value(orbit))
@@ -236,17 +241,8 @@ class Collector:
         if not self.flow.system.symmetric:
             return
         orbit = middle_orbit(branch)
-        half_later = -orbit.states(orbit.problem.phases[:-1] + math.pi)
         try:
-            image = solve_orbit(
-                orbit.problem.flow,
-                orbit.frequency_hz,
-                orbit.period,
-                guess=half_later,
-                observe=orbit.observe,
-                segments=orbit.problem.segments,
-            )
-            start = self._start_of(image)
+            start = self._start_of(mirror_image(orbit))
         except ConvergenceError as error:
             self.notes.append(f"the mirror image of branch {branch.name} was not found: {error}")
         else:
@@ -333,6 +329,31 @@ class Collector:
                          if s.kind == "PD"]  # fmt: skip
                 self.outlook.flips(2 * branch.period, len(flips))
         self.checkpoint.work = None
+
+
+def mirror_image(orbit: Orbit) -> Orbit:
+    """The mirror image of an orbit of a symmetric system.
+
+    Raises
+    ------
+    ConvergenceError
+        If it is not met.
+    """
+    problem = orbit.problem
+    if orbit.self_excited:
+        found = orbit.observed_extremes
+        lowest = orbit.states(found.phases[[np.argmin(found.values)]])[0]
+        state = problem.flow.to_state(-lowest)
+        return limit_cycle_near(problem, state, orbit.omega, orbit.observe)
+    half_later = -orbit.states(problem.phases[:-1] + math.pi)
+    return solve_orbit(
+        problem.flow,
+        orbit.frequency_hz,
+        orbit.period,
+        guess=half_later,
+        observe=orbit.observe,
+        segments=problem.segments,
+    )
 
 
 def notes_on_ends(branch: Branch) -> list[str]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from nldyn.base.arrays import Real
 from nldyn.base.errors import (
     SystemModelError,
     check_types,
@@ -43,6 +44,7 @@ from nldyn.runtime.progress import Progress, shows_progress, silent
 from nldyn.runtime.threads import one_thread
 from nldyn.search.collector import Collector, counted
 from nldyn.search.outlook import CONTACT, SEARCH, Outlook
+from nldyn.search.self_excited import follow_limit_cycles
 from nldyn.system.chart import FREQUENCY, THE_FREQUENCY, Chart, label_of, moves_frequency
 from nldyn.system.equilibrium import at_rest, rest
 from nldyn.system.parameters import Parameter
@@ -196,10 +198,16 @@ class Diagram:
     @property
     def _about(self) -> dict[str, Any]:
         name = "range_hz" if self.parameter.name == FREQUENCY else "range"
-        about = {name: self.limits, "observe": self.observe, "notes": list(self.notes)}
-        if self.frequency_hz is None:
-            return about
-        return {**about, "parameter": repr(self.parameter), "frequency_hz": self.frequency_hz}
+        about: dict[str, Any] = {
+            name: self.limits,
+            "observe": self.observe,
+            "notes": list(self.notes),
+        }
+        if self.parameter.name != FREQUENCY:
+            about["parameter"] = repr(self.parameter)
+        if self.frequency_hz is not None:
+            about["frequency_hz"] = self.frequency_hz
+        return about
 
 
 def check_known(known: Diagram, flow: FlowMap) -> Axis:
@@ -243,6 +251,7 @@ def diagram(
     search_points: int = 12,
     doublings: int = 0,
     observe: str | None = None,
+    start: Real | None = None,
     options: ContinuationOptions | None = None,
     search: OrbitSearchOptions | None = None,
     progress: Progress | None = None,
@@ -259,6 +268,9 @@ def diagram(
     the search is repeated once with four times as many initial states. What no simulation comes
     near (isolas of unstable orbits, say) is missed.
 
+    Of a system that nothing excites limit cycles are looked for: from rest, and carried along by
+    what moves beneath friction, by `nldyn.limit_cycle`, and continued with their frequency.
+
     Parameters
     ----------
     system : System or FlowMap
@@ -266,12 +278,14 @@ def diagram(
     limits : (float, float)
         Frequencies in Hz, or values of the parameter, ascending.
     periods : sequence of int
-        Period multiples wanted; may be empty when there are seeds.
+        Period multiples wanted; may be empty when there are seeds. Of limit cycles, as
+        `search_points` simulations find them, each has period 1.
     parameter : str or Parameter, optional
         What changes, the excitation frequency unless given: see
         `nldyn.system.chart.checked_parameter`.
     frequency_hz : float, optional
-        Excitation frequency in Hz, held where another parameter changes.
+        Excitation frequency in Hz, held where another parameter changes; none where nothing excites
+        the system.
     seeds : sequence of SubharmonicSeed
         Further values at which to look for a period (which need not be in `periods`).
     search_points : int
@@ -281,6 +295,8 @@ def diagram(
         How many doublings to follow at flips whose doubled period is not in `periods`.
     observe : str, optional
         Interface whose displacement is reported; the first unless given.
+    start : (2n,) array, optional
+        Of a system that nothing excites, modal displacements and velocities from which to simulate.
     options, search : optional
         Step control and search effort.
     progress : callable, optional
@@ -337,6 +353,7 @@ def diagram(
     wanted = _checked_periods(periods, seeds, axis)
     check_whole("search_points", search_points, 1, MOST_COUNT)
     check_whole("doublings", doublings, 0, MOST_COUNT)
+    _check_fits(axis, seeds, doublings, search, start)
     box = Collector(
         flow,
         axis,
@@ -346,6 +363,10 @@ def diagram(
     )
     box.checkpoint = checkpoint_of_several(checkpoint, box.branches, flow, axis)
     with box.checkpoint, computing_ahead(flow, jobs, executor) as box.ahead:
+        if axis.self_excited:
+            box.outlook = Outlook(places=search_points)
+            follow_limit_cycles(box, axis.middles(search_points)[::-1], start)
+            return Diagram.of(box)
         effort, whole = _effort(box, search, search_points, wanted)
         places = axis.middles(search_points)[::-1] if wanted else []
         again = MORE_STARTS if whole and _contact_is_missing(box) else 0
@@ -382,6 +403,23 @@ def _checked_periods(
                 f"({low:g}, {high:g})"
             )
     return sorted(set(periods))
+
+
+def _check_fits(
+    axis: Axis,
+    seeds: Sequence[SubharmonicSeed],
+    doublings: int,
+    search: OrbitSearchOptions | None,
+    start: Real | None,
+) -> None:
+    """Refuse what counts periods of an excitation where there is none, and a start where one is."""
+    if not axis.self_excited:
+        if start is not None:
+            raise SystemModelError("start: is for a system that nothing excites; give seeds")
+    elif seeds or doublings or search is not None:
+        raise SystemModelError(
+            "nothing excites the system: seeds, doublings and search are for excited ones"
+        )
 
 
 def _effort(

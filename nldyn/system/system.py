@@ -770,6 +770,11 @@ class System:
         """Whether something swings: any excitation but constant forces."""
         return bool(np.any(self.drive[self.orders > 0.0]))
 
+    @property
+    def carried(self) -> bool:
+        """Whether something moves beneath its friction, such as a belt."""
+        return any(slider.friction.base_speed for slider in self.sliders)
+
     def response(self, omega: float, clock: Clock | None = None) -> ForcedResponse:
         """Linear response at ω (rad/s), near or at a resonance, too; the clock as for `forcing`."""
         orders, drive = self.forcing(clock)

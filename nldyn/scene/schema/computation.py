@@ -23,6 +23,8 @@ class ObserveTable(Table):
 class StartTable(Table):
     """``[start]``: where ``nldyn simulate`` begins; undeformed and without speed unless given.
 
+    Where nothing excites the structure, ``nldyn run`` begins its simulations there, too.
+
     What is not given follows: of all states with these values it is the one of least energy.
     """
 
@@ -37,7 +39,10 @@ class StartTable(Table):
 class ContinuationTable(Table):
     """``[continuation]``: which branches of periodic orbits are followed, and how far.
 
-    They are followed over the excitation frequency, or over another number of the scene.
+    They are followed over the excitation frequency, or over another number of the scene. Where
+    nothing excites the structure, motions that excite themselves are simulated from `[start]`, or
+    from rest and carried along by what moves beneath friction, until they settle, and followed over
+    a `parameter`; their frequency is found.
     """
 
     range_hz: list[Frequency] | None = None
@@ -45,14 +50,15 @@ class ContinuationTable(Table):
     parameter: str | None = None
     """What changes in place of the frequency: a key such as `"stops.0.gap"` (tables in a list
     count from 0), `"stops.0.stiffness"`, `"stops.0.restitution"`, `"excitation.0.amplitude"`,
-    `"dampers.0.coefficient"`, `"springs.0.stiffness"`, `"damping.modal_ratio"` or
-    `"matrices.spin.hz"`; or in short `"gap"`, `"stiffness"`, `"restitution"` and so on of the first
-    stop, `"force"`, the strength of the only load that moves the structure, `"damping"`, the ratio
-    of all modes, and `"speed"` of a shaft that turns as fast as its load."""
+    `"dampers.0.coefficient"`, `"springs.0.stiffness"`, `"friction.0.base_speed"`,
+    `"damping.modal_ratio"` or `"matrices.spin.hz"`; or in short `"gap"`, `"stiffness"`,
+    `"restitution"` and so on of the first stop, `"force"`, the strength of the only load that moves
+    the structure, `"damping"`, the ratio of all modes, and `"speed"` of a shaft that turns as fast
+    as its load."""
     range: list[Number] | None = None
     """[unit of the parameter] Lowest and highest value of the parameter, in the unit of its key."""
     frequency_hz: Frequency | None = None
-    """[Hz] Excitation frequency, held while the parameter changes."""
+    """[Hz] Excitation frequency, held while the parameter changes; none without excitation."""
     periods: Annotated[list[Period], Field(min_length=1)] = [1, 2, 3]
     """Periods of the orbits to look for, in periods of the excitation: 1 is the harmonic
     branch, 3 the 1/3 subharmonics."""

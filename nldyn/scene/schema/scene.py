@@ -27,6 +27,8 @@ from nldyn.scene.schema.loads import AnyExcitationTable
 from nldyn.scene.schema.structures import ComponentTable, JointTable, ModalTable, StructureTables
 from nldyn.system.naming import is_angle
 
+STEADY = ("constant", "weight")  # kinds of loads that do not change in time
+
 
 class Scene(StructureTables):
     """A whole scene: a structure, what acts on it, and what to compute.
@@ -98,6 +100,16 @@ class Scene(StructureTables):
                 for at, against in element.ends:
                     if against is not None:
                         yield table, number, at, against
+
+    @property
+    def driven(self) -> bool:
+        """Whether a load moves the structure."""
+        return any(table.kind not in STEADY for table in self.excitation)
+
+    @property
+    def self_excited(self) -> bool:
+        """Whether motions are to be followed over a parameter that no load moves."""
+        return not self.driven and bool(self.continuation and self.continuation.parameter)
 
     @property
     def interface_names(self) -> list[str]:

@@ -164,7 +164,7 @@ def test_diagram_says_which_orbit_it_could_not_follow(monkeypatch):
     def fails(place, *_, **__):
         raise ConvergenceError(f"no orbit at {place.orbit.frequency_hz:g} Hz: singular Jacobian")
 
-    monkeypatch.setattr("nldyn.search.collector.start_point", fails)
+    monkeypatch.setattr("nldyn.branches.continuation.start_point", fails)
     found = diagram(make_one_dof(stops=[]), (25.0, 27.0), periods=(1,), search_points=1)
     assert found.branches == ()
     assert found.notes[0].startswith("orbit of period 1 found but not followed: no orbit at 25.98")
