@@ -130,8 +130,7 @@ def check_plane(
     if stiffness is None:
         raise SystemModelError(
             f"{owner}: friction with a second_tangent needs a tangential_stiffness: without a "
-            "spring what comes to rest in a plane would do so in no time at which its force is "
-            "told"
+            "spring the force of what comes to rest in a plane has no direction"
         )
 
 
