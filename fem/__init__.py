@@ -7,7 +7,8 @@ from fem.assembly.component import (
     MeshWarning,
     assemble,
 )
-from fem.assembly.contact import ContactPoints, contact_points, opposite_points, unit_vector
+from fem.assembly.contact import ContactPoints, contact_points, unit_vector
+from fem.assembly.opposite import ContactPair, opposite_points
 from fem.assembly.summary import MassProperties, mass_properties, summary
 from fem.base.errors import JointWarning, ModelError
 from fem.checks.unlikely import UnlikelyWarning
@@ -54,6 +55,7 @@ __all__ = [
     "Calibration",
     "CircularSection",
     "Component",
+    "ContactPair",
     "ContactPoints",
     "Coupling",
     "CrossSection",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
@@ -155,14 +155,15 @@ def couple(components: Mapping[str, ReducedModel], joints: Sequence[Joint]) -> R
     check_components(components)
     check_joints(components, joints)
     dual = [model.method == DUAL for model in components.values()]
+    shared = {f"{of}.{at}": told for of, m in components.items() for at, told in m.areas.items()}
     if all(dual) and joints:
-        return coupled_dually(components, joints)
+        return replace(coupled_dually(components, joints), areas=shared)
     if any(dual) and joints:
         others = sorted({m.method for m in components.values() if m.method != DUAL})
         raise ReductionError(
             f"components by '{DUAL}' cannot be coupled with components by '{others[0]}'"
         )
-    return coupled_primally(side_by_side(components), joints)
+    return replace(coupled_primally(side_by_side(components), joints), areas=shared)
 
 
 def coupled_primally(assembly: Assembly, joints: Sequence[Joint]) -> ReducedModel:

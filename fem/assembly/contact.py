@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,6 @@ from fem.mesh.cells import KINDS
 from fem.model.structure import AXES
 
 FLAT = 1e-4  # 1 - cosine of the angle between the normals of what counts as flat
-OPPOSITE = 1e-6  # of the length of a line, or of the mesh: how far off a point may lie
 HELD = 1e-12  # motion of a point, of one that is free: a support holds it
 MOST_PLACES = 12  # in one direction of a cell
 
@@ -70,6 +69,16 @@ class ContactPoints:
         rows = sparse.kron(sparse.eye_array(len(self.places)), along[None], format="csr")
         return np.asarray((rows @ self.motion).toarray(), dtype=np.float64)
 
+    def only(self, kept: IntArray) -> ContactPoints:
+        """Some of the points, by their numbers (n,)."""
+        rows = (3 * kept[:, None] + np.arange(3)).ravel()
+        return replace(
+            self,
+            places=self.places[kept],
+            weights=self.weights[kept],
+            motion=sparse.csr_array(self.motion[rows]),
+        )
+
 
 def contact_points(
     component: Component,
@@ -92,8 +101,8 @@ def contact_points(
     points
         Gauss's places in each direction of a cell, or "nodes": node by node.
     surface
-        Distance in m, along the normal, of the surface from the axis of beams: their points move
-        with the rotation, too.
+        Distance in m, along the normal, of the surface from the axis of beams or the middle of
+        shells: their points move with the rotation, too.
 
     Returns
     -------
@@ -122,7 +131,7 @@ def contact_points(
     """
     normal = unit_vector(at, direction)
     if points == "nodes":
-        blocks, measure = [_node_block(component, component.model.mesh.nodes(at))], "node"
+        blocks, measure = [node_block(component, component.model.mesh.nodes(at))], "node"
     else:
         whole = isinstance(points, int) and not isinstance(points, bool)
         if not (whole and 1 <= int(points) <= MOST_PLACES):
@@ -131,7 +140,7 @@ def contact_points(
                 f"{MOST_PLACES}, not {points!r}"
             )
         blocks, measure = _blocks(component, at, int(points), surface, normal)
-    places, weights, motion = _gathered(component, blocks)
+    places, weights, motion = gathered(component, blocks)
     size = np.abs(
         sparse.kron(sparse.eye_array(len(places)), np.abs(normal)[None], format="csr") @ abs(motion)
     ).sum(axis=1)
@@ -172,7 +181,7 @@ def unit_vector(at: str, direction: str | Sequence[float]) -> FloatArray:
     return np.asarray(vector / length, dtype=np.float64)
 
 
-def _gathered(
+def gathered(
     component: Component, blocks: Sequence[Block]
 ) -> tuple[FloatArray, FloatArray, SparseArray]:
     """Places (k, 3), weights (k,) and motion (3 k, N) of blocks of cells.
@@ -202,128 +211,26 @@ def _gathered(
     )
 
 
-def _node_block(component: Component, nodes: IntArray) -> Block:
+def node_block(component: Component, nodes: IntArray) -> Block:
     dofs = component.numbering.dofs(nodes)[:, :3]
     shapes = np.broadcast_to(np.eye(3), (len(nodes), 1, 3, 3))
     places = component.model.mesh.points[nodes][:, None]
     return places, np.ones((len(nodes), 1)), shapes, dofs
 
 
-def opposite_points(
-    component: Component,
-    points: ContactPoints,
-    at: str,
-    *,
-    surface: float = 0.0,
-) -> ContactPoints:
-    """The points of another set of a component that lie opposite to those of an area.
-
-    Parameters
-    ----------
-    component
-        What was assembled.
-    points
-        Those of the area.
-    at
-        The other set: beams, on which the points are found along the normal; else, and opposite to
-        nodes, nodes.
-    surface
-        Distance in m, against the normal, of the surface from the axis of the other beams.
-
-    Returns
-    -------
-    ContactPoints
-        In the order of the first ones, with their weights and the same direction.
-
-    Raises
-    ------
-    ModelError
-        If there is no such set, or nothing of it lies opposite to a point.
-
-    Examples
-    --------
-    >>> import fem
-    >>> places = {"a": (0, 0), "b": (2, 0), "c": (0, 0.1), "d": (3, 0.1)}
-    >>> mesh = fem.frame_mesh(places, [("low", "a", "b", 4), ("high", "c", "d", 5)])
-    >>> beam = fem.BeamPart(fem.Material(2e11, 7800.0), fem.Section(1e-3, 1e-8))
-    >>> pair = fem.assemble(fem.StructureModel(
-    ...     mesh,
-    ...     parts={"low": beam, "high": beam},
-    ...     supports=[fem.Support(end, ("x", "y", "rotation")) for end in ("a", "c")],
-    ...     separate=True,
-    ...     plane=True,
-    ... ))
-    >>> low = fem.contact_points(pair, "low", "y", points=1)
-    >>> high = fem.opposite_points(pair, low, "high")
-    >>> bool(abs(high.places[:, 0] - low.places[:, 0]).max() < 1e-15)
-    True
-    """
-    mesh, normal = component.model.mesh, points.direction
-    beams = {} if points.measure == "node" else component.model.beams_on(at)
-    flat = np.eye(3) - np.outer(normal, normal)
-    if beams:
-        lines = [component.model.beams[name][1][numbers] for name, numbers in beams.items()]
-        ends = mesh.points[np.concatenate(lines)] @ flat
-        span, away = ends[:, 1] - ends[:, 0], points.places[:, None] @ flat - ends[:, 0]
-        length = np.maximum((span**2).sum(axis=1), np.finfo(float).tiny)
-        s = np.clip((away * span).sum(axis=2) / length, 0.0, 1.0)
-        off, size = np.linalg.norm(away - s[:, :, None] * span, axis=2), float(length.max()) ** 0.5
-    else:
-        nodes = mesh.nodes(at)
-        off = np.linalg.norm((points.places[:, None] - mesh.points[nodes]) @ flat, axis=2)
-        size = float(np.ptp(mesh.points, axis=0).max())
-    nearest, found = off.argmin(axis=1), off.min(axis=1)
-    if found.max() > OPPOSITE * size:
-        place = ", ".join(f"{x:g}" for x in points.places[int(found.argmax())])
-        raise ModelError(
-            f"{mesh.source}: contact of {points.at!r} against {at!r}: nothing of that lies "
-            f"opposite to the point at ({place})"
-        )
-    order = np.arange(len(nearest))
-    if beams:
-        along = s[order, nearest]
-        blocks, order = _on_beams(component, beams, nearest, along, -surface * normal)
-    else:
-        blocks = [_node_block(component, nodes[nearest])]
-    places, _, motion = _gathered(component, blocks)
-    rows = (3 * order[:, None] + np.arange(3)).ravel()
-    return replace(points, at=at, places=places[order], motion=sparse.csr_array(motion[rows]))
-
-
-def _on_beams(
-    component: Component,
-    beams: Mapping[str, IntArray],
-    chosen: IntArray,
-    s: FloatArray,
-    arm: FloatArray,
-) -> tuple[list[Block], IntArray]:
-    """One place s (k,) on each of some lines (k,) out of those of all beams; where each block's is.
-
-    Lines are counted through all beams.
-    """
-    first, blocks, order = 0, [], []
-    for name, numbers in beams.items():
-        own = np.flatnonzero((chosen >= first) & (chosen < first + len(numbers)))
-        if len(own):
-            places = s[own, None]
-            at_lines = numbers[chosen[own] - first]
-            blocks.append(_beam_block(component, name, at_lines, places, np.ones(1), arm))
-            order.append(own)
-        first += len(numbers)
-    return blocks, np.argsort(np.concatenate(order))
-
-
 def _blocks(
     component: Component, at: str, points: int, surface: float, normal: FloatArray
 ) -> tuple[list[Block], str]:
     model = component.model
-    blocks = []
-    for kind, facets in model.facets_on(at).items():
-        blocks.append(_facet_block(component, at, kind, facets, points, normal))
+    check_surface(component, at, surface)
+    blocks = [
+        _facet_block(component, at, kind, facets, points, normal, surface)
+        for kind, facets in model.facets_on(at).items()
+    ]
     measure = "length" if model.plane else "area"
     s, weights = gauss(points)
     beams = [
-        _beam_block(component, name, numbers, s, weights, surface * normal)
+        beam_block(component, name, numbers, s, weights, surface * normal)
         for name, numbers in model.beams_on(at).items()
     ]
     if blocks and beams:
@@ -332,10 +239,6 @@ def _blocks(
         raise ModelError(
             f"{model.mesh.source}: contact at {at!r}: there is no outer face, edge or beam whose "
             "nodes are all in it; take points = 'nodes' for single nodes"
-        )
-    if blocks and surface:
-        raise ModelError(
-            f"{model.mesh.source}: contact at {at!r}: surface is for beams, not for faces"
         )
     return (blocks, measure) if blocks else (beams, "length")
 
@@ -347,6 +250,7 @@ def _facet_block(
     facets: IntArray,
     points: int,
     normal: FloatArray,
+    surface: float,
 ) -> Block:
     places, weights = rule(kind, points)
     values, gradients = KINDS[kind].basis(places)
@@ -361,17 +265,39 @@ def _facet_block(
             f"{np.degrees(np.arcsin(min(sine, 1.0))):.3g} degrees off its direction; make an area "
             "of each flat part, with its own direction"
         )
-    shapes = np.einsum("qb,ij->qibj", values, np.eye(3)).reshape(len(places), 3, -1)
-    dofs = 3 * component.numbering.translation[facets][:, :, None] + np.arange(3)
-    return (
-        np.einsum("qb,fbi->fqi", values, corners),
-        areas,
-        np.broadcast_to(shapes, (len(facets), *shapes.shape)),
-        dofs.reshape(len(facets), -1),
-    )
+    values, arm = np.broadcast_to(values, (len(facets), *values.shape)), surface * normal
+    at_places = np.einsum("fqb,fbi->fqi", values, corners) + arm
+    return at_places, areas, *facet_shapes(component, facets, values, arm)
 
 
-def _beam_block(
+def facet_shapes(
+    component: Component, facets: IntArray, values: FloatArray, arm: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Translations (f, q, 3, d) at places of facets (f, b) from their degrees of freedom (f, d).
+
+    By the shape functions (f, q, b) there, an arm off shells, which turns with them.
+    """
+    per_node = np.eye(3)
+    dofs = component.numbering.dofs(facets)[..., :3]
+    if np.any(arm):
+        per_node = np.hstack([per_node, -cross_matrix(arm)])
+        dofs = component.numbering.dofs(facets)
+    shapes = np.einsum("fqb,ij->fqibj", values, per_node)
+    return shapes.reshape(*shapes.shape[:3], -1), dofs.reshape(len(facets), -1)
+
+
+def check_surface(component: Component, at: str, surface: float) -> None:
+    """Refuse a surface that is off the nodes of solids."""
+    model = component.model
+    facets = [nodes.ravel() for nodes in model.facets_on(at).values()]
+    if surface and facets and np.any(component.numbering.rotation[np.concatenate(facets)] < 0):
+        raise ModelError(
+            f"{model.mesh.source}: contact at {at!r}: surface is for beams and shells, not for "
+            "faces of solids"
+        )
+
+
+def beam_block(
     component: Component,
     name: str,
     numbers: IntArray,

@@ -26,7 +26,7 @@ from nldyn.reduction.load_case import system_of_reduced
 from nldyn.runtime.progress import Progress
 from nldyn.scene.checks import check_ratio_count
 from nldyn.scene.component import build_component
-from nldyn.scene.contact import area_stops, told_of_areas
+from nldyn.scene.contact import area_stops, told_of_areas, with_areas
 from nldyn.scene.faults import told_as, within_component
 from nldyn.scene.load_case import load_case_of
 from nldyn.scene.matrices import build_matrices, skew_matrices
@@ -285,11 +285,11 @@ def build_parts(scene: Scene) -> dict[str, AnyComponent]:
     SceneError
         As `build_any`, with the name of the component.
     """
-    parts = {}
+    parts: dict[str, AnyComponent] = {}
     for name, part in scene.component_scenes.items():
         with within_component(scene, name):
             parts[name] = build_any(part)
-    return parts
+    return with_areas(scene, parts)
 
 
 def join(scene: Scene, parts: Mapping[str, AnyComponent] | None = None) -> cms.ReducedModel:
@@ -319,7 +319,10 @@ def join(scene: Scene, parts: Mapping[str, AnyComponent] | None = None) -> cms.R
             models[name] = build_reduced(part, parts[name])
     _tell_of_crossed_joints(scene)
     with told_as(scene, ("joints",), cms.ReductionError):
-        return cms.couple(models, joints_of(scene))
+        whole = cms.couple(models, joints_of(scene))
+    for sentence in told_of_areas(scene, whole):
+        logger.info(sentence)
+    return whole
 
 
 def joints_of(scene: Scene) -> list[cms.Joint]:

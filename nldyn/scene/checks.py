@@ -526,11 +526,32 @@ def _check_areas(scene: Scene, report: Report) -> None:
         if not isinstance(area, MeshAreaTable):
             continue
         key = ("contact_areas", number, "at")
+        if scene.components:
+            _check_area_of_components(scene, number, area, report)
+            continue
         if scene.mesh is None:
             raise report(key, "names a set of a mesh, and there is no [mesh]: list interfaces")
         if scene.reduction is not None and scene.reduction.tolerance is not None:
             fault = "does not go with reduction.tolerance; give 'modes' or 'cutoff_hz'"
             raise report(key, fault)
+
+
+def _check_area_of_components(
+    scene: Scene, number: int, area: MeshAreaTable, report: Report
+) -> None:
+    """Refuse sets that are not "component.set" of a component with a mesh."""
+    for key in ("at", "against"):
+        component, dot, _ = (getattr(area, key) or "").partition(".")
+        if getattr(area, key) is None:
+            continue
+        place = ("contact_areas", number, key)
+        if not dot:
+            raise report(place, "must name a component and a set of its mesh: 'component.set'")
+        if component not in scene.components:
+            raise report(place, unknown_name(component, scene.components, "a component"))
+        if scene.components[component].mesh is None:
+            fault = f"names a set of a mesh, and component '{component}' has none: list interfaces"
+            raise report(place, fault)
 
 
 def _check_seeds(scene: Scene, report: Report) -> None:

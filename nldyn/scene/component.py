@@ -66,7 +66,9 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component:
             mesh = fem.refined(mesh, refinement)
     with told_as(scene, (), fem.ModelError):
         component = fem.assemble(_model(described, mesh))
-        return with_areas(scene, _loaded(scene, component))
+        whole = with_areas(scene, {"": _loaded(scene, component)})[""]
+    assert isinstance(whole, fem.Component)
+    return whole
 
 
 def _loaded(scene: Scene, component: fem.Component) -> fem.Component:

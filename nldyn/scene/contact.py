@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,6 @@ from nldyn.base.errors import SystemModelError
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import scene_error
 from nldyn.scene.schema.contacts import (
-    ContactAreaTable,
     ListedAreaTable,
     MeshAreaTable,
     exponent_of,
@@ -23,7 +22,11 @@ from nldyn.scene.schema.scene import Scene
 from nldyn.system.contact_area import contact_area, gap_beside
 from nldyn.system.stop import Stop
 
-SIDES = ("", " against", " along", " along against")
+FAULTS = (fem.ModelError, cms.ReductionError, SystemModelError)
+TILTED = 0.5  # degrees between two surfaces from which on it is told
+
+Component = fem.Component | cms.Matrices
+Parts = Mapping[str, Component]
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,10 @@ class Found:
         How many more points supports hold.
     measure : {"area", "length", "node"}, optional
         What the weights are: m², m, or nothing.
+    pair : fem.ContactPair, optional
+        The points of both sides, where two surfaces of meshes touch.
+    areas : list of str
+        What the reduced model calls the area, and the one on the other side.
     """
 
     sides: Sequence[Sequence[str] | None]
@@ -53,28 +60,55 @@ class Found:
     places: Real | None = None
     held: int = 0
     measure: str | None = None
+    pair: fem.ContactPair | None = None
+    areas: Sequence[str] = ()
 
 
-def with_areas(scene: Scene, component: fem.Component) -> fem.Component:
-    """The component with the interfaces of the areas of contact of its scene.
+@dataclass(frozen=True)
+class _End:
+    """Points of one component, and what it calls the area that they make."""
+
+    part: str
+    points: fem.ContactPoints
+    name: str
+
+    def names(self, word: str = "") -> list[str]:
+        """Of the interfaces of the points."""
+        return [f"{self.name} {i + 1}{word}" for i in range(len(self.points.places))]
+
+    def vectors(self, table: MeshAreaTable) -> dict[str, Real]:
+        """Load vectors of the interfaces, along the normal and the surface."""
+        named = dict(zip(self.names(), self.points.vectors(), strict=True))
+        if table.along is not None:
+            rows = self.points.vectors(_axis(table.along))
+            named |= zip(self.names(" along"), rows, strict=True)
+        return named
+
+    def of_whole(self, name: str) -> str:
+        """What the model of all components calls an interface or an area."""
+        return f"{self.part}.{name}" if self.part else name
+
+
+def with_areas(scene: Scene, parts: Parts) -> dict[str, Component]:
+    """Components by name with the interfaces of the areas of contact of their scene.
+
+    A scene without components has one, which is called "".
 
     Raises
     ------
     SceneError
-        If the mesh has no such set, or it is none that can touch.
+        If a mesh has no such set, or it is none that can touch.
     """
+    touching = dict(parts)
     found: list[Found] = []
     for number, table in enumerate(scene.contact_areas):
-        key = ("contact_areas", number)
         if isinstance(table, ListedAreaTable):
             found.append(_listed(table))
             continue
-        with told_as(scene, key, fem.ModelError, cms.ReductionError, SystemModelError):
-            one, vectors = _placed(component, table)
-            component = component.with_interfaces(vectors, _attached(table, one))
-        found.append(one)
+        with told_as(scene, ("contact_areas", number), *FAULTS):
+            found.append(_placed(scene, touching, table))
     scene._areas_found = tuple(scene.contact_areas), tuple(found)
-    return component
+    return touching
 
 
 def check_one_mesh(scene: Scene) -> None:
@@ -82,22 +116,6 @@ def check_one_mesh(scene: Scene) -> None:
     if any(isinstance(table, MeshAreaTable) for table in scene.contact_areas):
         fault = "go with the mesh: compare modes or methods, not meshes"
         raise scene_error(scene.file, ("contact_areas",), fault)
-
-
-def _names(table: ContactAreaTable) -> tuple[str, str]:
-    """What the reduction calls an area, and the one on the other side."""
-    return table.called, f"{table.called} against"
-
-
-def _attached(table: MeshAreaTable, one: Found) -> dict[str, cms.Area]:
-    """The areas, on both sides if both move, that the reduction gives attachment modes to."""
-    assert one.weights is not None
-    stiffness = table.stiffness * one.weights
-    return {
-        name: cms.Area(tuple(points), stiffness, table.attachment_modes, table.static_error)
-        for name, points in zip(_names(table), one.sides[:2], strict=True)
-        if points is not None
-    }
 
 
 def _listed(table: ListedAreaTable) -> Found:
@@ -110,42 +128,64 @@ def _as_gaps(gap: float | list[float]) -> Real | float:
     return np.array(gap) if isinstance(gap, list) else gap
 
 
-def _placed(component: fem.Component, table: MeshAreaTable) -> tuple[Found, dict[str, Real]]:
-    """The points of an area of a mesh, and the load vectors of their interfaces."""
+def _placed(scene: Scene, parts: dict[str, Component], table: MeshAreaTable) -> Found:
+    """The points of an area of a mesh, with whose interfaces the components are replaced."""
+    part, at = _part_and_set(scene, table.at)
     points = fem.contact_points(
-        component, table.at, table.direction, points=table.points, surface=table.surface
+        _meshed(parts, part), at, _axis(table.direction), points=table.points,
+        surface=table.surface,
+    )  # fmt: skip
+    if table.against is None:
+        ends, pair = [_End(part, points, table.name or at)], None
+    else:
+        other, against = _part_and_set(scene, table.against)
+        body, surface = _meshed(parts, other), table.surface_against
+        pair = fem.opposite_points(body, points, against, surface=surface)
+        ends = [_End(part, pair.near, table.name or at)]
+        ends.append(_End(other, pair.far, f"{table.name or at} against"))
+    points = ends[0].points
+    stiffness = table.stiffness * points.weights
+    for end in ends:
+        area = cms.Area(end.names(), stiffness, table.attachment_modes, table.static_error)
+        touching = _meshed(parts, end.part).with_interfaces(end.vectors(table), {end.name: area})
+        parts[end.part] = touching
+    sides: list[list[str] | None] = [None] * 4
+    for number, end in enumerate(ends):
+        sides[number] = [end.of_whole(name) for name in end.names()]
+        if table.along is not None:
+            sides[number + 2] = [end.of_whole(name) for name in end.names(" along")]
+    return Found(
+        sides,
+        points.weights,
+        _gaps(table, points.places, pair),
+        points.places,
+        points.held,
+        points.measure,
+        pair,
+        [end.of_whole(end.name) for end in ends],
     )
-    vectors = [points.vectors(), None, None, None]
-    along = None if table.along is None else _axis(table.along)
-    if along is not None:
-        vectors[2] = points.vectors(along)
-    if table.against is not None:
-        other = fem.opposite_points(component, points, table.against, surface=table.surface_against)
-        vectors[1] = other.vectors()
-        if along is not None:
-            vectors[3] = other.vectors(along)
-    count = len(points.places)
-    sides = [
-        None if rows is None else [f"{table.called} {i + 1}{side}" for i in range(count)]
-        for rows, side in zip(vectors, SIDES, strict=True)
-    ]
-    named = {
-        name: row
-        for names, rows in zip(sides, vectors, strict=True)
-        if names is not None and rows is not None
-        for name, row in zip(names, rows, strict=True)
-    }
-    gaps = _gaps(table, points.places)
-    found = Found(sides, points.weights, gaps, points.places, points.held, points.measure)
-    return found, named
+
+
+def _part_and_set(scene: Scene, name: str) -> tuple[str, str]:
+    """The component and the set of its mesh; without components that is called ""."""
+    if not scene.components:
+        return "", name
+    part, _, at = name.partition(".")
+    return part, at
+
+
+def _meshed(parts: Parts, name: str) -> fem.Component:
+    component = parts[name]
+    assert isinstance(component, fem.Component)  # as `nldyn.scene.checks` makes sure
+    return component
 
 
 def _axis(given: str | Sequence[float]) -> str | list[float]:
     return given if isinstance(given, str) else [float(each) for each in given]
 
 
-def _gaps(table: MeshAreaTable, places: Real) -> Real:
-    """The gap at each point (k,)."""
+def _gaps(table: MeshAreaTable, places: Real, pair: fem.ContactPair | None) -> Real:
+    """The gap at each point (k,): what is given beside the distance of two surfaces."""
     if isinstance(table.gap, list) and len(table.gap) != len(places):
         raise SystemModelError(
             f"gap has {len(table.gap)} values, but the area has {len(places)} points"
@@ -154,7 +194,8 @@ def _gaps(table: MeshAreaTable, places: Real) -> Real:
     axis = None if table.axis is None else fem.unit_vector(table.called, _axis(table.axis))
     normal = fem.unit_vector(table.called, _axis(table.direction))
     beside = gap_beside(places, normal, centre, slope=table.slope, radius=table.radius, axis=axis)
-    return np.asarray(_as_gaps(table.gap)) + beside
+    apart = 0.0 if pair is None else pair.gaps
+    return np.asarray(_as_gaps(table.gap) + beside + apart)
 
 
 def areas_found(scene: Scene) -> tuple[Found, ...]:
@@ -163,9 +204,9 @@ def areas_found(scene: Scene) -> tuple[Found, ...]:
     if len(listed) == len(scene.contact_areas):
         return tuple(listed)
     if scene._areas_found is None or scene._areas_found[0] != tuple(scene.contact_areas):
-        from nldyn.scene.component import build_component  # which calls `with_areas`
+        from nldyn.scene.build import build_any, build_parts  # which call `with_areas`
 
-        build_component(scene)
+        (build_parts if scene.components else build_any)(scene)
     found: tuple[Found, ...] = scene._areas_found[1]
     return found
 
@@ -174,13 +215,13 @@ def told_of_areas(scene: Scene, reduced: cms.ReducedModel) -> list[str]:
     """What each area of a mesh is, and what the reduction gave to it, a sentence each."""
     sentences = []
     for table, found in zip(scene.contact_areas, areas_found(scene), strict=True):
-        if not isinstance(table, MeshAreaTable) or found.places is None or found.weights is None:
+        if found.places is None or found.weights is None:
             continue
-        held = f" ({found.held} more are held by supports)" if found.held else ""
         unit = {"area": "m²", "length": "m"}.get(found.measure or "")
         of = f" that stand for {found.weights.sum():.4g} {unit}" if unit else ""
-        text = f"contact area '{table.called}': {len(found.places)} points{of}{held}"
-        for name, side in zip(_names(table), ("", " on the other side"), strict=True):
+        text = f"contact area '{table.called}': {len(found.places)} points{of}"
+        text += "".join(f" ({told})" for told in _beside(found))
+        for name, side in zip(found.areas, ("", " on the other side"), strict=False):
             if name in reduced.areas:
                 given = reduced.areas[name]
                 text += (
@@ -188,6 +229,22 @@ def told_of_areas(scene: Scene, reduced: cms.ReducedModel) -> list[str]:
                 )
         sentences.append(text)
     return sentences
+
+
+def _beside(found: Found) -> list[str]:
+    """What is left out of an area, and how its surfaces lie."""
+    told, pair = [], found.pair
+    if found.held:
+        told.append(f"{found.held} more are held by supports")
+    if pair is None:
+        return told
+    if pair.alone:
+        told.append(f"{pair.alone} more have nothing opposite and are left out")
+    if pair.gaps.min() < 0.0:
+        told.append(f"in the mesh the surfaces overlap by up to {-pair.gaps.min():.4g} m")
+    if pair.tilt > TILTED:
+        told.append(f"the other surface is inclined by up to {pair.tilt:.3g} degrees")
+    return told
 
 
 def area_stops(scene: Scene) -> tuple[Stop, ...]:

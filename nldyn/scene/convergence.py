@@ -11,7 +11,7 @@ from nldyn.reduction.convergence import METHODS, Component, ConvergenceStudy, co
 from nldyn.reduction.studied import JoinedComponents
 from nldyn.scene.build import AnyComponent, build_reduced, check_held, join, joints_of
 from nldyn.scene.component import build_component
-from nldyn.scene.contact import check_one_mesh
+from nldyn.scene.contact import check_one_mesh, with_areas
 from nldyn.scene.faults import within_component
 from nldyn.scene.load_case import load_case_of
 from nldyn.scene.matrices import build_matrices
@@ -105,10 +105,13 @@ def _studied(scene: Scene, refinement: int, chosen: Sequence[str]) -> Component:
     """The component of a scene, or all of them, with those that are chosen to be reduced."""
     if not scene.components:
         return _component(scene, refinement)
-    parts = {}
+    parts: dict[str, AnyComponent] = {}
     for name, part in scene.component_scenes.items():
         with within_component(scene, name):
             parts[name] = _component(part, refinement)
+    if refinement > 1:
+        check_one_mesh(scene)
+    parts = with_areas(scene, parts)
     check_held(scene, join(scene, parts))
     reduced = {name: part for name, part in scene.component_scenes.items() if part.reduction}
     varied = {name: each for name, each in parts.items() if name in (chosen or reduced)}

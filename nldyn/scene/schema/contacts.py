@@ -251,10 +251,12 @@ class ContactAreaTable(Table):
     exponent: Annotated[float, Field(ge=1, le=LARGEST_EXPONENT)] | None = None
     """Exponent of the law `"hertz"`, from 1 to 4; 1.5 unless given."""
     gap: Number | Annotated[list[Number], Field(min_length=1)] = 0.0
-    """[m] Clearance at rest, one or at each point; a negative one is a preload."""
+    """[m] Clearance at rest, one or at each point; a negative one is a preload. Where `against` is
+    of a mesh, it adds to the distance of both surfaces in the mesh."""
     against: str | Annotated[list[str], Field(min_length=1)] | None = None
-    """What moves on the other side: beams of the same mesh, nodes that lie opposite to nodes, or a
-    list of interfaces; the ground unless given."""
+    """What moves on the other side: a face, edge or beams of the mesh, whose own mesh need not
+    match, nodes that lie opposite to nodes, or a list of interfaces; the ground unless given. With
+    components both are `"component.set"`, of one or of two that have the same coordinates."""
     dissipation: NotNegative = 0.0
     """[s/m] Loss of the contact (Hunt and Crossley): it grows with the penetration, 0 or more."""
     dashpot: NotNegative = 0.0
@@ -304,9 +306,9 @@ class MeshAreaTable(ContactAreaTable):
     """[m] Place [x, y, z] of the mesh where the gap is `gap`; the middle of the points unless
     given."""
     surface: NotNegative = 0.0
-    """[m] Of beams: distance of the surface from their axis."""
+    """[m] Of beams or shells: distance of the surface from their axis or middle."""
     surface_against: NotNegative = 0.0
-    """[m] The same of the beams on the other side."""
+    """[m] The same of the other side."""
     attachment_modes: Annotated[int, Field(ge=0)] | None = None
     """How many attachment modes the reduction gives to the area; chosen by `static_error` unless
     given. `nldyn check` tells both."""

@@ -124,7 +124,7 @@ def test_what_makes_no_area_is_refused_in_a_sentence():
         (arm, "root", "y", {"points": "nodes"}, "nothing of it moves along"),
         (arm, "wing", "y", {}, "wing"),
         (body, "z1", "x", {}, "90 degrees off its direction"),
-        (body, "z1", "z", {"surface": 0.1}, "surface is for beams"),
+        (body, "z1", "z", {"surface": 0.1}, "surface is for beams and shells"),
     ):
         with pytest.raises(fem.ModelError, match=said):
             fem.contact_points(component, at, direction, **more)
@@ -152,7 +152,7 @@ def test_points_opposite_on_other_beams_move_as_their_axis_does(plane):
         )
     )
     low = fem.contact_points(pair, "low", "y", points=3)
-    found = fem.opposite_points(pair, low, "high")
+    found = fem.opposite_points(pair, low, "high").far
     x, stiffness = low.places[:, 0], 2e11 * 0.02 * 0.01**3 / 12.0
     assert np.allclose(found.places, low.places + np.array([0.0, 0.1, 0.0]), atol=1e-12)
     u = spsolve(pair.stiffness, pair.interfaces["tip"])
