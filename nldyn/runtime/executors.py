@@ -220,14 +220,24 @@ def _ended_by_ctrl_c(pools: Sequence[Executor | None]) -> Iterator[None]:
 
 
 def _end_processes(executor: Executor | None) -> None:
-    """End the processes of a pool at once, after Ctrl-C.
+    """End the processes of a pool at once, whatever they are at.
 
-    A terminal sends that to all of them. One that gets a second one while it waits for work ends
-    with the lock of the pool's queue, and all others wait for that without end.
+    After Ctrl-C, too, which a terminal sends to all of them: one that gets a second one while it
+    waits for work ends with the lock of the pool's queue, and all others wait for that without end.
+    One that ends while it writes leaves a part of its answer, for whose rest a thread of the pool
+    would wait without end if this process did not close its own end for writing.
     """
+    processes = list((getattr(executor, "_processes", None) or {}).values())
+    answers = getattr(executor, "_result_queue", None)
+    if isinstance(executor, ProcessPoolExecutor):
+        executor.shutdown(wait=False, cancel_futures=True)
     with ignored_interruption():
-        for process in list((getattr(executor, "_processes", None) or {}).values()):
+        for process in processes:
             process.terminate()
+        for process in processes:
+            process.join()
+        if answers is not None:
+            answers._writer.close()
 
 
 @contextmanager
@@ -247,23 +257,12 @@ def process_pool(count: int) -> Iterator[ProcessPoolExecutor]:
     try:
         yield pool
     finally:
-        stop_processes(pool)
+        _end_processes(pool)
 
 
 def quiet_process() -> None:
     """Let this process end when the one that started it ends."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def stop_processes(pool: ProcessPoolExecutor) -> None:
-    """End a pool and its processes at once, whatever they are at."""
-    processes = list((getattr(pool, "_processes", None) or {}).values())
-    pool.shutdown(wait=False, cancel_futures=True)
-    with ignored_interruption():
-        for process in processes:
-            process.terminate()
-        for process in processes:
-            process.join()
 
 
 def _end_with_parent() -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import struct
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -34,7 +36,7 @@ from nldyn.base.resources import example
 from nldyn.longterm import basin_edge, brute_force, contact_measures, stable_manifold
 from nldyn.longterm.measures import measures_table
 from nldyn.runtime import executors, run_all
-from nldyn.runtime.executors import TaskError, as_finished
+from nldyn.runtime.executors import TaskError, as_finished, process_pool
 from nldyn.scene.build import build_system
 from nldyn.scene.read import load_scene
 
@@ -396,3 +398,24 @@ def test_points_on_the_edge_of_basins_do_not_depend_on_the_executor():
         again, others = basin_edge(found, 4, executor=pool)
     np.testing.assert_array_equal(points, again)
     assert [s.period for s in saddles] == [s.period for s in others]
+
+
+def half_an_answer(told):
+    """In a process of a pool: write the beginning of an answer to the pool, and no more."""
+    frame = sys._getframe()
+    while "result_queue" not in frame.f_locals:
+        frame = frame.f_back
+    frame.f_locals["result_queue"]._writer._send(struct.pack("!i", 1000) + b"half")
+    told.touch()
+    time.sleep(600)
+
+
+def test_a_process_that_is_ended_while_it_answers_does_not_hold_the_program(tmp_path):
+    told = tmp_path / "told"
+    with process_pool(1) as pool:
+        pool.submit(half_an_answer, told)
+        while not told.exists():
+            time.sleep(0.01)
+        reader = pool._executor_manager_thread
+    reader.join(timeout=60)
+    assert not reader.is_alive()
