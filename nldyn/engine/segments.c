@@ -106,10 +106,10 @@ static void pass_event(Motion *M, int event, double h)
         if (M->closed[event]) M->closings[event]++;
     }
     switch_with(M, here, M->t, h);
+    if (M->undecided < 0) find_undecided(M);
     if (!any_sprung(M->fl)) return;
     contact_forces(M, here);
     load_springs(M, here, M->t, SHUT, 10.0 * coarsest_instant(M->fl) * h, event);
-    if (M->undecided < 0) find_undecided(M);
 }
 
 /* fly to the first contact or to the end */

@@ -360,6 +360,15 @@ def test_what_friction_does_is_not_decided_where_no_force_holds_it():
         assert ("stop 0" in found.failure and "at phase 0 rad" in found.failure) == fails
 
 
+def test_what_slips_at_rest_into_where_no_force_holds_it_is_told_at_once():
+    """Painlevé's rod again, stuck under 1 N until 3 sin φ N along it are 1.5 times that."""
+    system, _ = rod(math.atan(2.0), 0.0, 1.5)
+    loads = (ConstantForce("down", 1.0), HarmonicForce("along", 3.0, phase_deg=90.0))
+    flow = FlowMap(system.with_elements(excitation=loads))
+    found = flow.shoot(np.zeros((1, 6)), np.array([0.0, 1.0]), 1.0)
+    assert f"at phase {math.pi / 6.0:.6g} rad" in found.failure
+
+
 def test_a_branch_in_the_friction_and_its_file(tmp_path):
     system, body, hertz = oscillator(0.3, rests=False)
     friction = Parameter("friction")
