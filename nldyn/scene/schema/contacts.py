@@ -218,6 +218,8 @@ class RoundClearanceTable(Table):
             refuse(self, ("exponent",), "law 'linear'")
         if self.friction and self.surface_speed is None:
             raise ValueError("has 'friction', which needs the 'surface_speed' of what turns, or 0")
+        if self.surface_speed is not None and "friction" not in self.model_fields_set:
+            raise ValueError("has 'surface_speed', which needs a 'friction'")
         return self
 
     @property
@@ -274,6 +276,8 @@ class ContactAreaTable(Table):
             refuse(self, ("exponent",), "law 'linear'")
         if (self.friction is None) != (self.along is None):
             raise ValueError("needs both 'friction' and 'along', or neither")
+        if not self.pulls and not self.dashpot:
+            raise ValueError("has 'pulls = false', which needs a 'dashpot' above 0")
         return self
 
     @property
@@ -322,6 +326,12 @@ class MeshAreaTable(ContactAreaTable):
             raise ValueError("has 'axis', which needs the 'radius' of a cylinder")
         if self.radius == 0.0:
             raise ValueError("needs a 'radius' other than 0")
+        if self.centre is not None and self.slope is None and self.radius is None:
+            raise ValueError("has 'centre', which needs a 'slope' or a 'radius'")
+        if self.surface_against and self.against is None:
+            raise ValueError("has 'surface_against', which needs 'against'")
+        if self.attachment_modes is not None and "static_error" in self.model_fields_set:
+            raise ValueError("has both 'attachment_modes' and 'static_error'; keep one")
         return self
 
 

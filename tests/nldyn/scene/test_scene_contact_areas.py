@@ -125,6 +125,7 @@ def test_friction_beside_an_area_with_friction_is_followed_by_its_own_number(tmp
         ("weights = [0.5, 0.25]", "points = 3", "points is not a key of a list"),
         ("weights = [0.5, 0.25]", "surface = 0.1", "surface is not a key of a list"),
         ("weights = [0.5, 0.25]", "closes = true", "must be 1 or -1"),
+        ("weights = [0.5, 0.25]", "pulls = false", "needs a 'dashpot' above 0"),
     ],
 )
 def test_what_makes_no_area_of_interfaces_is_refused(tmp_path, old, new, said):
@@ -144,6 +145,9 @@ def test_what_makes_no_area_of_interfaces_is_refused(tmp_path, old, new, said):
         ("points = 2", "points = 2\ncloses = -1", "is not a key of an area of a mesh"),
         ("modes = 4", "tolerance = 0.01", "does not go with reduction.tolerance"),
         ("points = 2", 'points = 2\nagainst = "root"', "nothing of that lies opposite"),
+        ("radius = 20.0", "", "needs a 'slope' or a 'radius'"),
+        ("points = 2", "points = 2\nsurface_against = 0.01", "which needs 'against'"),
+        ("points = 2", "attachment_modes = 3\nstatic_error = 0.1", "keep one"),
     ],
 )
 def test_what_makes_no_area_of_a_mesh_is_refused(tmp_path, old, new, said):

@@ -86,6 +86,7 @@ def test_its_numbers_may_change(tmp_path, key, parameter):
         (('plane = ["x", "y"]', 'plane = ["x"]'), "plane"),
         (("clearance = 6e-4", "clearance = 0.0"), "clearance"),
         (("surface_speed = 5.0", ""), "surface_speed"),
+        (("friction = 0.08", ""), "which needs a 'friction'"),
         (('law = "linear"', 'law = "linear"\nexponent = 2.0'), "exponent"),
         (('law = "linear"', 'law = "linear"\ngap = 2.0'), "gap"),
     ],
