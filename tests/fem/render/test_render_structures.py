@@ -322,7 +322,7 @@ def test_a_browser_plays_a_motion_that_stays_on_its_side_of_the_stop(bar, tmp_pa
     )  # fmt: skip
     rest, quarter, lowest, back = in_browser(path, tmp_path)
     assert min(each["surface"][0] for each in (rest, quarter, lowest, back)) > 2_000
-    # how many pixels are coloured differs from run to run by some per cent, their mean height hardly
+    # the number of coloured pixels differs from run to run by some per cent, their height hardly
     heights = [each["surface"][1] for each in (rest, quarter, lowest)]
     assert heights[0] > heights[1] > heights[2]
     assert abs(back["surface"][1] - heights[1]) < 0.1 * (heights[0] - heights[2])
