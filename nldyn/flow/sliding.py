@@ -136,26 +136,15 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
     moved = _ways_of_nodes(flow, along)
     moved -= slider.friction.base_speed * _times_of_nodes(motion, panels[slides])
     pressed = rec.force[panels[slides], slider.stop] if slider.stop >= 0 else slider.normal_force
-    time, loss = float(rec.duration.sum()), float((force[slides] * moved).sum())
+    loss = float((force[slides] * moved).sum())
     pressed_distance = float(np.abs(pressed * moved).sum())
     if slider.stop in flow.system.rigid_stops:
         in_impacts = float(rubbed(flow, number, rigid_impacts(motion, slider.stop)).sum())
         loss += slider.friction.coefficient * in_impacts
         pressed_distance += in_impacts
     forces = force @ fine_table(tables.nodes.size).T
-    return SliderMeasures(
-        slider,
-        flow.system.unit(slider.at) == "rad",
-        float(peaks(np.abs(forces)).max(initial=0.0)),
-        float(np.abs(ways[slides]).sum()),
-        float(duration[~slides].sum()) / time,
-        float(duration[slides].sum()) / time,
-        1.0 - float(duration.sum()) / time,
-        loss,
-        pressed_distance,
-        loss / time,
-        pressed_distance / time,
-    )
+    largest, way = peaks(np.abs(forces)), float(np.abs(ways[slides]).sum())
+    return _measures(motion, slider, largest, way, duration, slides, loss, pressed_distance)
 
 
 def _plane_measures(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
@@ -171,7 +160,7 @@ def _plane_measures(motion: Trajectory, number: int, ends: Real) -> SliderMeasur
     panels = np.flatnonzero(rec.kind >= 0)
     if slider.stop >= 0:
         panels = _touching(motion, slider.stop)
-    slides = rec.force[panels][:, movers].any(axis=(1, 2))
+    slides = np.asarray(rec.force[panels][:, movers].any(axis=(1, 2)))
     sliding, duration = panels[slides], rec.duration[panels]
     pulled, strain = rec.force[sliding][:, rows], rec.depth[sliding][:, rows]
     moved, size = rec.force[sliding][:, movers], np.hypot(*np.moveaxis(strain, 1, 0))
@@ -186,21 +175,9 @@ def _plane_measures(motion: Trajectory, number: int, ends: Real) -> SliderMeasur
     distance = float(way.sum() - (at_ends[1] - at_ends[0]).sum())
     loss = float((force * way).sum() - 0.5 * spring * (at_ends[1] ** 2 - at_ends[0] ** 2).sum())
     fine = rec.force[panels][:, rows] @ fine_table(tables.nodes.size).T
-    mu, whole = slider.friction.coefficient, float(rec.duration.sum())
+    mu, largest = slider.friction.coefficient, peaks(np.hypot(*np.moveaxis(fine, 1, 0)))
     pressed = loss / mu if mu > 0.0 else _pressed_way(motion, slider, sliding, way)
-    return SliderMeasures(
-        slider,
-        flow.system.unit(slider.at) == "rad",
-        float(peaks(np.hypot(*np.moveaxis(fine, 1, 0))).max(initial=0.0)),
-        distance,
-        float(duration[~slides].sum()) / whole,
-        float(duration[slides].sum()) / whole,
-        1.0 - float(duration.sum()) / whole,
-        loss,
-        pressed,
-        loss / whole,
-        pressed / whole,
-    )
+    return _measures(motion, slider, largest, distance, duration, slides, loss, pressed)
 
 
 def _pressed_way(
@@ -244,16 +221,31 @@ def _round_measures(motion: Trajectory, ring: Slider, ends: Real) -> SliderMeasu
     way = np.abs(way - ring.friction.base_speed * _times_of_nodes(motion, panels))
     way[sticks] = 0.0
     forces = np.abs(across @ fine_table(flow.tables.nodes.size).T)
-    time, closed = float(rec.duration.sum()), rec.duration[panels]
     pressed_distance = float((pressed * way).sum())
     loss = ring.friction.coefficient * pressed_distance
+    total, closed = float(way.sum()), rec.duration[panels]
+    return _measures(motion, ring, peaks(forces), total, closed, ~sticks, loss, pressed_distance)
+
+
+def _measures(
+    motion: Trajectory,
+    slider: Slider,
+    largest: Real,
+    way: float,
+    closed: Real,
+    slides: NDArray[np.bool_],
+    loss: float,
+    pressed_distance: float,
+) -> SliderMeasures:
+    """Measures of a slider by the durations (k,) of the panels in which it is pressed on."""
+    time, system = float(motion.record.duration.sum()), motion.flow.system
     return SliderMeasures(
-        ring,
-        False,
-        float(peaks(forces).max(initial=0.0)),
-        float(way.sum()),
-        float(closed[sticks].sum()) / time,
-        float(closed[~sticks].sum()) / time,
+        slider,
+        slider.stop not in system.round_stops and system.unit(slider.at) == "rad",
+        float(largest.max(initial=0.0)),
+        way,
+        float(closed[~slides].sum()) / time,
+        float(closed[slides].sum()) / time,
         1.0 - float(closed.sum()) / time,
         loss,
         pressed_distance,
