@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from plane_sliding import Body, Disc
+from sliding import off_differences
 
 from nldyn import (
     FlowMap,
@@ -77,22 +78,6 @@ def from_state(flow, z):
     n, rows, modal = flow.system.size, bases(flow.system), flow.to_start(z)
     places = modal[2 * n :].reshape(2, -1).T.ravel()
     return np.concatenate([rows @ modal[:n], rows @ modal[n : 2 * n], places])
-
-
-def off_differences(flow, found, z, phases, omega, step):
-    """How far derivatives by the state and by ω are off those by differences, of their size."""
-
-    def slope(by_state, by_omega):
-        up, down = (
-            flow.shoot(z + way * step * by_state, phases, omega * (1.0 + way * step * by_omega))
-            for way in (1.0, -1.0)
-        )
-        return (up.ends[0] - down.ends[0]) / (2.0 * step)
-
-    directions = [*((row, 0.0) for row in np.eye(z.size)), (np.zeros(z.size), 1.0)]
-    exact = [*found.jacobians[0].T, omega * found.d_omega[0]]
-    off = [slope(*way) - column for way, column in zip(directions, exact, strict=True)]
-    return np.abs(off).max() / max(np.abs(exact).max(), 1.0)
 
 
 def agrees(seed, kinds):
