@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from den_hartog import response, with_two_stops
 from scipy.optimize import brentq
 from sliding import Body, Contact, Wall
 
@@ -21,12 +22,6 @@ def block(share, *, damping=0.0, stops=()):
         [[1.0]], [[1.0]], {"x": [1.0]}, damping=[[damping]], stops=stops,
         dampers=[DryFriction("x", 1.0, share)], excitation=[HarmonicForce("x", 1.0)],
     )  # fmt: skip
-
-
-def response(ratio):
-    """Den Hartog's response and damping functions V and U."""
-    angle = math.pi / ratio
-    return 1.0 / (1.0 - ratio**2), math.sin(angle) / (ratio * (1.0 + math.cos(angle)))
 
 
 @pytest.mark.parametrize("ratio", [0.6, 0.8, 1.25, 1.5])
@@ -53,52 +48,17 @@ def test_stops_begin_where_den_hartog_says(ratio):
     assert behind.max_abs_displacement == pytest.approx(limit / ratio**2, rel=5e-4)
 
 
-def with_two_stops(ratio, share):
-    """Amplitude, and the share of the time that it rests, of a motion with two stops a cycle.
-
-    It rests at the top until the pull is less than the spring's by its friction, and slides to the
-    bottom in one swing: each piece is in closed form.
-    """
-    size, _ = response(ratio)
-
-    def swing(top):
-        """How much farther it comes than the bottom, and its time; nan if it does not stop."""
-        start = math.acos(top - share)
-        c, d = top - share - size * math.cos(start), ratio * size * math.sin(start)
-
-        def place(t):
-            return size * np.cos(start + ratio * t) + share + c * np.cos(t) + d * np.sin(t)
-
-        def speed(t):
-            turned = -ratio * size * np.sin(start + ratio * t)
-            return turned - c * np.sin(t) + d * np.cos(t)
-
-        times = np.linspace(1e-2, math.pi / ratio, 400)
-        ends = np.flatnonzero(speed(times) >= 0.0)
-        if not ends.size or ends[0] == 0:
-            return math.nan, math.nan
-        time = brentq(speed, times[ends[0] - 1], times[ends[0]], xtol=1e-15)
-        return place(time) + top, time
-
-    farthest = share / ratio**2  # it rests no farther out
-    tops = np.linspace(max(0.0, share - 1.0), min(1.0 + share, farthest), 200)[1:-1]
-    gaps = [swing(top)[0] for top in tops]
-    at = next(i for i in range(1, len(tops)) if gaps[i - 1] * gaps[i] <= 0.0)
-    top = brentq(lambda top: swing(top)[0], tops[at - 1], tops[at], xtol=1e-15)
-    return top, 1.0 - ratio * swing(top)[1] / math.pi
-
-
 @pytest.mark.parametrize(
     ("ratio", "share"), [(0.8, 0.9), (0.6, 0.85), (0.5, 0.8), (0.9, 0.95), (0.7, 0.88)]
 )
 def test_two_stops_a_cycle_are_those_of_pieces_in_closed_form(ratio, share):
-    top, rests = with_two_stops(ratio, share)
+    known = with_two_stops(ratio, share)
     orbit = solve_orbit(block(share), ratio / TURN)
     (found,) = orbit.friction
-    assert rests > 0.1
-    assert orbit.max_abs_displacement == pytest.approx(top, rel=1e-9)
-    assert found.stuck == pytest.approx(rests, abs=1e-8)
-    assert found.loss == pytest.approx(4.0 * share * top, rel=1e-9)
+    assert known.rests > 0.1
+    assert orbit.max_abs_displacement == pytest.approx(known.top, rel=1e-9)
+    assert found.stuck == pytest.approx(known.rests, abs=1e-8)
+    assert found.loss == pytest.approx(4.0 * share * known.top, rel=1e-9)
 
 
 @pytest.mark.parametrize(("ratio", "share"), [(0.8, 0.3), (0.5, 0.6)])

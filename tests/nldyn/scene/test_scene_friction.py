@@ -1,9 +1,14 @@
 """``[[friction]]`` of a scene."""
 
-import pytest
+import math
 
+import pytest
+from den_hartog import with_two_stops
+
+from nldyn import solve_orbit
 from nldyn.app.describe import describe_slider
 from nldyn.base.errors import SceneError
+from nldyn.base.resources import example
 from nldyn.scene.build import build_system
 from nldyn.scene.followed import followed_parameter
 from nldyn.scene.read import load_scene
@@ -166,3 +171,11 @@ def test_a_second_tangent_makes_friction_over_a_plane(tmp_path):
 def test_bad_second_tangents_are_refused(tmp_path, other, told):
     with pytest.raises(SceneError, match=told):
         build_system(with_third(tmp_path, other))
+
+
+def test_the_example_of_a_block_that_stops_moves_as_den_hartog_says():
+    system = build_system(load_scene(example("block_that_stops.toml")))
+    for ratio in (0.5, 1.1):
+        known, orbit = with_two_stops(ratio, 0.8), solve_orbit(system, ratio / math.tau)
+        assert orbit.max_abs_displacement == pytest.approx(known.top, rel=1e-9)
+        assert orbit.friction[0].stuck == pytest.approx(known.rests, abs=1e-8)
