@@ -19,7 +19,7 @@ class Disc:
     """Where a body slides over the plane of two `tangents` (2, n) behind a spring.
 
     It is pressed on by a constant force or by a stop k (normal . q - gap)^p. What it slides on
-    moves along the first tangent.
+    moves along both tangents.
     """
 
     tangents: Vector
@@ -30,7 +30,7 @@ class Disc:
     stiffness: float = 0.0
     exponent: float = 1.0
     gap: float = 0.0
-    base_speed: float = 0.0
+    base_speed: tuple[float, float] = (0.0, 0.0)
 
     def depth(self, y: Vector) -> float:
         return float(self.normal @ y[: self.normal.size]) - self.gap
@@ -49,7 +49,7 @@ class Disc:
 
     def speed(self, y: Vector) -> Vector:
         n = self.tangents.shape[1]
-        return self.tangents @ y[n : 2 * n] - np.array([self.base_speed, 0.0])
+        return self.tangents @ y[n : 2 * n] - np.array(self.base_speed)
 
 
 @dataclass
@@ -90,7 +90,7 @@ class Body:
         total = self.load(t) - self.damping @ y[n : 2 * n] - self.stiffness @ y[:n]
         places = []
         for i, (contact, mode) in enumerate(zip(self.contacts, self.modes, strict=True)):
-            belt = np.array([contact.base_speed, 0.0])
+            belt = np.array(contact.base_speed)
             if contact.normal is not None:
                 total = total - contact.normal * contact.grip(y) / contact.coefficient
             if mode == OPEN:

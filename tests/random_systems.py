@@ -24,8 +24,10 @@ from nldyn.engine.sample import local_extremes, sample_states, touches
 from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.gauss import gauss_tables
 from nldyn.orbits.periodic_schur import product_eigenvalues
+from nldyn.system.friction import DryFriction, Friction
 from nldyn.system.loads import ConstantForce, HarmonicForce, Unbalance
 from nldyn.system.rigid_stop import RigidStop
+from nldyn.system.round_stop import RoundStop
 from nldyn.system.springs_dampers import PolynomialSpring
 from nldyn.system.stop import Stop
 from nldyn.system.system import System
@@ -36,14 +38,17 @@ BAD = np.array([np.nan, np.inf, -np.inf, 0.0, 1e308, -1e308, 5e-324, 1e-300, -1.
 NUMBERS = "blocks", "rows", "bound3", "force", "orders", "drive"
 COLUMNS = [StopRow._fields.index(name) for name in (
     "gap", "stiffness", "exponent", "dissipation", "dashpot", "mobility", "duration", "instant",
+    "adhesion", "fading", "belt", "pressing", "tangential", "place_rate", "centre", "rub",
+    "surface",
 )]  # fmt: skip
 
 
 def random_system(rng: np.random.Generator) -> System:
-    """Up to five modes and, now and then, forty stops."""
+    """Up to five modes and, now and then, forty stops; half of them with friction."""
     n = int(rng.integers(1, 6))
     count = int(rng.choice([0, 1, 2, 3, 40], p=[0.1, 0.4, 0.3, 0.19, 0.01]))
-    stops: list[Stop | RigidStop] = []
+    stops: list[Stop | RigidStop | RoundStop] = []
+    dampers: list[DryFriction] = []
     for _ in range(count):
         gap, direction = float(rng.choice([0.0, 1e-4])), int(rng.choice([1, -1]))
         if rng.random() < 0.2:
@@ -54,15 +59,42 @@ def random_system(rng: np.random.Generator) -> System:
         else:
             exponent = float(rng.choice([1.0, 1.5, 2.2]))
             stops.append(Stop("a", 10.0 ** rng.uniform(5, 9), exponent, gap, direction))
+    if rng.random() < 0.5:
+        add_friction(rng, stops, dampers)
     return System.from_modal(
         np.sort(rng.uniform(0.0, 100.0, n)),
-        {"a": rng.uniform(-1, 1, n), "b": rng.uniform(-1, 1, n)},
+        {name: rng.uniform(-1, 1, n) for name in "abc"},
         modal_damping=rng.uniform(0.0, 0.1, n),
         stops=stops,
+        dampers=dampers,
         springs=[PolynomialSpring("b", [1e4, 0.0, 1e10])] if rng.random() < 0.1 else [],
         excitation=[Unbalance("a", 1e-5), HarmonicForce("b", 1.0, harmonic=2)]
         + ([ConstantForce("a", 1.0)] if rng.random() < 0.2 else []),
     )
+
+
+def add_friction(
+    rng: np.random.Generator,
+    stops: list[Stop | RigidStop | RoundStop],
+    dampers: list[DryFriction],
+) -> None:
+    """Of a stop over a line or a plane, of a ring, and of what is pressed on all the time."""
+    belt, speed = float(rng.choice([0.0, 0.1])), float(rng.choice([0.0, 0.1]))
+    law, spring = Friction(float(rng.uniform(0.0, 1.0)), base_speed=belt), 10.0 ** rng.uniform(4, 8)
+    second = "c" if rng.random() < 0.7 else None
+    if rng.random() < 0.4:
+        stops.append(
+            Stop("a", 1e6, float(rng.choice([1.0, 1.5])), friction=law, tangent="b",
+                 tangential_stiffness=spring, second_tangent=second)
+        )  # fmt: skip
+    if rng.random() < 0.4:
+        dampers.append(DryFriction("b", 10.0, law, None, spring, second))
+    if rng.random() < 0.4:
+        stops.append(
+            RoundStop(("a", "b"), 1e7, 1e-4, 1.5, (1e-5, 0.0), friction=0.2, surface_speed=speed)
+        )
+    if rng.random() < 0.2:
+        dampers.append(DryFriction("a", 5.0, Friction(0.3, 0.5, 0.1, belt)))
 
 
 def spoiled(data: SystemData, rng: np.random.Generator) -> SystemData:

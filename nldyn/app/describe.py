@@ -253,7 +253,9 @@ def describe_slider(slider: Slider, length: str = "m") -> str:
         where += f" against '{slider.across[1]}'" if slider.across[1] else ""
     told = f"friction {where}: coefficient {law.coefficient:.6g}"
     told += f", at rest {law.at_rest:.6g}" if law.adhesion else ""
-    told += f", base at {law.base_speed:.6g} {length}/s" if law.base_speed else ""
+    if any(law.base_speeds):
+        speeds = law.base_speeds if slider.across else law.base_speeds[:1]
+        told += f", base at {' and '.join(f'{speed:.6g}' for speed in speeds)} {length}/s"
     if slider.tangential_stiffness is not None:
         told += f", behind {slider.tangential_stiffness:.6g} {moment_unit(length)}/{length}"
     force = f"{slider.normal_force:.6g} {moment_unit(length)}"

@@ -56,6 +56,7 @@ from nldyn.flow.packing import (
     of_areas,
     parameter_tables,
     second_row,
+    second_tangent_row,
     slider_row,
     stop_row,
 )
@@ -465,16 +466,15 @@ class FlowMap:
         """Rows of second tangents and movers; first tangents, in `stops`, are told of theirs."""
         more = 2 * (self.system.size + len(self.system.sprung))
         seconds, movers = [], []
-        for i, (first, second, *both) in enumerate(self.plane_rows.values()):
+        for i, (number, (first, second, *both)) in enumerate(self.plane_rows.items()):
+            slider = self.system.sliders[number]
             for of, other, mover in ((first, second, both[0]), (second, first, both[1])):
                 v = self._pushed[of]
                 row = stops[first]._replace(beside=float(other), mover=float(mover))
                 if of == first:
                     stops[first] = row
                 else:
-                    place = float(more + 2 * i)
-                    mobility = float(v @ v)
-                    seconds.append(row._replace(mobility=mobility, place=place, place_rate=0.0))
+                    seconds.append(second_tangent_row(row, slider, float(v @ v), more + 2 * i))
                 movers.append(mover_row(of, float(v @ v)))
         return seconds + movers
 

@@ -116,7 +116,7 @@ def slider_row(slider: Slider, mobility: float, options: FlowOptions, place: int
         friction=friction.coefficient,
         adhesion=friction.adhesion,
         fading=friction.fading_speed or 0.0,
-        belt=friction.base_speed,
+        belt=friction.base_speeds[0],
         normal=float(slider.stop),
         pressing=slider.normal_force,
     )
@@ -125,8 +125,17 @@ def slider_row(slider: Slider, mobility: float, options: FlowOptions, place: int
     return row._replace(
         tangential=slider.tangential_stiffness,
         place=float(place),
-        place_rate=friction.base_speed / math.sqrt(mobility),
+        place_rate=friction.base_speeds[0] / math.sqrt(mobility),
         belt=0.0,  # the place goes with it
+    )
+
+
+def second_tangent_row(first: StopRow, slider: Slider, mobility: float, place: int) -> StopRow:
+    """Numbers of the second tangent of a slider over a plane, by those of its first one."""
+    return first._replace(
+        mobility=mobility,
+        place=float(place),
+        place_rate=slider.friction.base_speeds[1] / math.sqrt(mobility),
     )
 
 

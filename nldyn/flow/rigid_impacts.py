@@ -105,7 +105,7 @@ def _impulses(
         none = np.zeros(jump.shape)
         return np.array([jump / flow.mobility([stop])[0, 0], none]), np.array([none, none])
     row = flow.rate_rows[len(flow.system.stops) + number]
-    belt = flow.system.sliders[number].friction.base_speed
+    belt = flow.system.sliders[number].friction.base_speeds[0]
     slips = np.array([states @ row - belt for states in (before, behind)])
     jumps = np.array([jump, slips[0] - slips[1]])
     return np.linalg.solve(_mobility(flow, stop, number), jumps), slips

@@ -126,15 +126,15 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
     if slider.tangential_stiffness is not None:  # what slides is not what the spring is fixed to
         place = flow.places(ends)[:, flow.system.sprung.index(number)]
         inner = place[panels, None] + inner - force / slider.tangential_stiffness
-    ways = np.diff(place)[panels] - slider.friction.base_speed * duration
-    size = np.abs(place).max() + np.abs(slider.friction.base_speed * duration).max(initial=0.0)
+    ways = np.diff(place)[panels] - slider.friction.base_speeds[0] * duration
+    size = np.abs(place).max() + np.abs(slider.friction.base_speeds[0] * duration).max(initial=0.0)
     held = held_in_pieces(motion, number)[panels]
     mobility = float(flow.mobility([output])[0, 0])
     pulled = np.where(held, mobility * np.abs(force).max(axis=1, initial=0.0) * duration**2, 0.0)
     slides = np.abs(ways) > np.where(held, UNMOVED, ROUNDING) * (size + pulled)
     along = np.column_stack([place[panels], inner, place[panels + 1]])[slides]
     moved = _ways_of_nodes(flow, along)
-    moved -= slider.friction.base_speed * _times_of_nodes(motion, panels[slides])
+    moved -= slider.friction.base_speeds[0] * _times_of_nodes(motion, panels[slides])
     pressed = rec.force[panels[slides], slider.stop] if slider.stop >= 0 else slider.normal_force
     loss = float((force[slides] * moved).sum())
     pressed_distance = float(np.abs(pressed * moved).sum())
@@ -180,9 +180,7 @@ def _plane_measures(motion: Trajectory, number: int, ends: Real) -> SliderMeasur
     return _measures(motion, slider, largest, distance, duration, slides, loss, pressed)
 
 
-def _pressed_way(
-    motion: Trajectory, slider: Slider, panels: NDArray[np.intp], way: Real
-) -> float:
+def _pressed_way(motion: Trajectory, slider: Slider, panels: NDArray[np.intp], way: Real) -> float:
     """Integral of the normal force over ways (k, m) of the nodes of panels."""
     pressed = motion.record.force[panels, slider.stop] if slider.stop >= 0 else slider.normal_force
     return float((pressed * way).sum())
@@ -218,7 +216,7 @@ def _round_measures(motion: Trajectory, ring: Slider, ends: Real) -> SliderMeasu
     x, y = (place[:, 1:-1] for place in places)
     dx, dy = (_ways_of_nodes(flow, place) for place in places)
     way = (x * dy - y * dx) / np.hypot(x, y)
-    way = np.abs(way - ring.friction.base_speed * _times_of_nodes(motion, panels))
+    way = np.abs(way - ring.friction.base_speeds[0] * _times_of_nodes(motion, panels))
     way[sticks] = 0.0
     forces = np.abs(across @ fine_table(flow.tables.nodes.size).T)
     pressed_distance = float((pressed * way).sum())

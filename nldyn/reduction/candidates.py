@@ -15,7 +15,7 @@ from nldyn.system.chart import Chart, checked_parameter, with_value
 from nldyn.system.contact_law import duration_factor
 from nldyn.system.round_stop import RoundStop
 from nldyn.system.stop import Stop
-from nldyn.system.system import AnyDamper, AnySpring, System
+from nldyn.system.system import AnyDamper, AnySpring, System, ends_of
 
 INVISIBLE = 1e-6
 MOST_MODES = 60
@@ -125,11 +125,7 @@ def in_use(model: cms.ReducedModel, setting: LoadCase) -> Real:
         *setting.dampers,
         *setting.springs,
     )
-    names = {element.at for element in (*pairs, *setting.excitation)}
-    ends = [(e, end) for e in pairs for end in ("against", "tangent", "tangent_against")]
-    names |= {getattr(e, end) for e, end in ends if getattr(e, end, None) is not None}
-    around = [stop for stop in setting.stops if isinstance(stop, RoundStop)]
-    names |= {name for stop in around for pair in stop.ends for name in pair if name is not None}
+    names = {name for each in (*pairs, *setting.excitation) for _, name in ends_of(each)}
     names.add(setting.observe or model.interfaces[0])
     return np.array([model.participation[name] for name in model.interfaces if name in names])
 

@@ -13,13 +13,14 @@ from nldyn.orbits.conditions import driving_source
 from nldyn.scene.build import build_reduced, build_system
 from nldyn.scene.faults import told_as
 from nldyn.scene.schema.connections import DampingTable
+from nldyn.scene.schema.contacts import ALONG
 from nldyn.scene.schema.scene import Scene
 from nldyn.scene.schema.structures import StructureTables
 from nldyn.system.parameters import strength
 
 Given = TypeVar("Given", bound=StructureTables)
 LONG_STEPS = ContinuationOptions(max_step=0.2)  # along a curve that bends little
-RUBBING = {"friction", "along", "along_against"}  # keys of an area
+RUBBING = {"friction", "tangential_stiffness", *ALONG}  # keys of an area
 BEGIN = 1e-3  # smallest amplitude, relative to the largest
 
 

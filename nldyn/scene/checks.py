@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from nldyn.base.errors import SceneError, must_be_symmetric
 from nldyn.scene.messages import KeyPath, joined, scene_error, show, unknown_name
-from nldyn.scene.schema.contacts import ListedAreaTable, MeshAreaTable
+from nldyn.scene.schema.contacts import ALONG, ListedAreaTable, MeshAreaTable
 from nldyn.scene.schema.loads import BaseTable
 from nldyn.scene.schema.parts import BeamTable, ShellTable, SolidTable
 from nldyn.scene.schema.scene import Scene
@@ -64,6 +64,7 @@ def check_scene(scene: Scene, file: Path) -> None:
     _check_interface_names(scene, report)
     _check_absolute(scene, report)
     _check_areas(scene, report)
+    _check_planes(scene, report)
     _check_seeds(scene, report)
     _check_explore(scene, report)
 
@@ -114,7 +115,7 @@ def check_computable(scene: Scene, file: Path) -> None:
         fault = "is missing: nothing moves the structure"
         if scene.excitation:
             fault = "is constant: there is no branch to follow, but 'nldyn simulate' takes it"
-        if any(table.base_speed for table in scene.friction):
+        if any(any(table.of_coulomb.base_speeds) for table in scene.friction):
             fault += (
                 "; motions that excite themselves are followed over the 'range' of a 'parameter' "
                 "of [continuation], such as 'friction.0.base_speed'"
@@ -536,6 +537,27 @@ def _check_areas(scene: Scene, report: Report) -> None:
             raise report(key, fault)
 
 
+def _check_planes(scene: Scene, report: Report) -> None:
+    """Refuse second tangents that are not perpendicular to the first one and to the stop there."""
+    for number, table in enumerate(scene.friction):
+        if table.second_tangent is None:
+            continue
+        known = dict(scene.interfaces)
+        for part, component in scene.components.items():
+            known |= {f"{part}.{name}": each for name, each in component.interfaces.items()}
+        second = known.get(table.second_tangent)
+        others = [table.at]
+        if table.stop is not None and table.stop < len(scene.stops):
+            others.append(scene.stops[table.stop].at)
+        for other in others:
+            first = known.get(other)
+            if first is not None and second is not None and first.direction == second.direction:
+                fault = (
+                    f"lies along '{first.direction}' as '{other}', and must be perpendicular"
+                )
+                raise report(("friction", number, "second_tangent"), fault)
+
+
 def _check_area_of_components(
     scene: Scene, number: int, area: MeshAreaTable, report: Report
 ) -> None:
@@ -599,7 +621,7 @@ def _interfaces_used(scene: Scene) -> Iterable[tuple[KeyPath, str]]:
                 yield ("friction", number, key), getattr(rough, key)
     for number, area in enumerate(scene.contact_areas):
         if isinstance(area, ListedAreaTable):
-            for key in ("at", "against", "along", "along_against"):
+            for key in ("at", "against", *ALONG):
                 named = getattr(area, key) or ()
                 yield from ((("contact_areas", number, key), name) for name in named)
     for number, around in enumerate(scene.round_clearances):

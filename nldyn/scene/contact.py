@@ -13,16 +13,13 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError
 from nldyn.scene.faults import told_as
 from nldyn.scene.messages import scene_error
-from nldyn.scene.schema.contacts import (
-    ListedAreaTable,
-    MeshAreaTable,
-    exponent_of,
-)
+from nldyn.scene.schema.contacts import ALONG, ListedAreaTable, MeshAreaTable, exponent_of
 from nldyn.scene.schema.scene import Scene
 from nldyn.system.contact_area import contact_area, gap_beside
 from nldyn.system.stop import Stop
 
 FAULTS = (fem.ModelError, cms.ReductionError, SystemModelError)
+SKEW = 1e-6  # cosine of the angle between two axes that are perpendicular
 TILTED = 0.5  # degrees between two surfaces from which on it is told
 
 Component = fem.Component | cms.Matrices
@@ -35,9 +32,9 @@ class Found:
 
     Parameters
     ----------
-    sides : four lists of str or None
-        Interfaces of the points along the normal, of those on the other side, and of both along the
-        surface.
+    sides : six lists of str or None
+        Interfaces of the points along the normal, of those on the other side, and of both along
+        each of two tangents.
     weights : (k,) or None
         What the points stand for.
     gaps : (k,) or float
@@ -79,9 +76,9 @@ class _End:
     def vectors(self, table: MeshAreaTable) -> dict[str, Real]:
         """Load vectors of the interfaces, along the normal and the surface."""
         named = dict(zip(self.names(), self.points.vectors(), strict=True))
-        if table.along is not None:
-            rows = self.points.vectors(_axis(table.along))
-            named |= zip(self.names(" along"), rows, strict=True)
+        for word, axis in _tangents(table):
+            rows = self.points.vectors(_axis(axis))
+            named |= zip(self.names(word), rows, strict=True)
         return named
 
     def of_whole(self, name: str) -> str:
@@ -120,7 +117,7 @@ def check_one_mesh(scene: Scene) -> None:
 
 def _listed(table: ListedAreaTable) -> Found:
     weights = None if table.weights is None else np.array(table.weights)
-    sides = (table.at, table.against, table.along, table.along_against)
+    sides = (table.at, table.against, *(getattr(table, key) for key in ALONG))
     return Found(sides, weights, _as_gaps(table.gap))
 
 
@@ -131,6 +128,7 @@ def _as_gaps(gap: float | list[float]) -> Real | float:
 def _placed(scene: Scene, parts: dict[str, Component], table: MeshAreaTable) -> Found:
     """The points of an area of a mesh, with whose interfaces the components are replaced."""
     part, at = _part_and_set(scene, table.at)
+    _check_plane(table)
     points = fem.contact_points(
         _meshed(parts, part), at, _axis(table.direction), points=table.points,
         surface=table.surface,
@@ -149,11 +147,10 @@ def _placed(scene: Scene, parts: dict[str, Component], table: MeshAreaTable) -> 
         area = cms.Area(end.names(), stiffness, table.attachment_modes, table.static_error)
         touching = _meshed(parts, end.part).with_interfaces(end.vectors(table), {end.name: area})
         parts[end.part] = touching
-    sides: list[list[str] | None] = [None] * 4
+    sides: list[list[str] | None] = [None] * 6
     for number, end in enumerate(ends):
-        sides[number] = [end.of_whole(name) for name in end.names()]
-        if table.along is not None:
-            sides[number + 2] = [end.of_whole(name) for name in end.names(" along")]
+        for first, word in enumerate(("", *(word for word, _ in _tangents(table)))):
+            sides[number + 2 * first] = [end.of_whole(name) for name in end.names(word)]
     return Found(
         sides,
         points.weights,
@@ -164,6 +161,23 @@ def _placed(scene: Scene, parts: dict[str, Component], table: MeshAreaTable) -> 
         pair,
         [end.of_whole(end.name) for end in ends],
     )
+
+
+def _check_plane(table: MeshAreaTable) -> None:
+    """Refuse a second tangent that is not perpendicular to the first one and the normal."""
+    if table.second_along is None or table.along is None:
+        return
+    axes = (table.second_along, table.along, table.direction)
+    second, *others = (fem.unit_vector(table.called, _axis(axis)) for axis in axes)
+    for key, other in zip(("along", "direction"), others, strict=True):
+        if abs(second @ other) > SKEW:
+            raise SystemModelError(f"'second_along' must be perpendicular to '{key}'")
+
+
+def _tangents(table: MeshAreaTable) -> list[tuple[str, str | list[float]]]:
+    """What interfaces along each tangent of an area are called, and its axis."""
+    words = ((" along", table.along), (" across", table.second_along))
+    return [(word, axis) for word, axis in words if axis is not None]
 
 
 def _part_and_set(scene: Scene, name: str) -> tuple[str, str]:
@@ -257,7 +271,7 @@ def area_stops(scene: Scene) -> tuple[Stop, ...]:
             fault = f"has the name '{table.called}' of another one: give it a 'name' of its own"
             raise scene_error(scene.file, ("contact_areas", number), fault)
         names.add(table.called)
-        points, against, tangents, beside = found.sides
+        points, against, tangents, beside, across, across_beside = found.sides
         assert points is not None
         with told_as(scene, ("contact_areas", number), SystemModelError):
             stops += contact_area(
@@ -275,5 +289,8 @@ def area_stops(scene: Scene) -> tuple[Stop, ...]:
                 friction=table.friction,
                 tangents=tangents,
                 tangents_against=beside,
+                tangential_stiffness=table.tangential_stiffness,
+                second_tangents=across,
+                second_tangents_against=across_beside,
             )
     return tuple(stops)

@@ -42,12 +42,16 @@ def follow_limit_cycles(box: Collector, values: list[float], start: Real | None)
 def starts_of(system: System) -> list[Real]:
     """Modal states (2n,): at rest, and carried along by all that moves beneath friction."""
     still = at_rest(rest(system))
-    moving = [slider for slider in system.sliders if slider.friction.base_speed]
+    moving = [
+        (system.vector_between(*ends), speed)
+        for slider in system.sliders
+        for ends, speed in zip(slider.ends, slider.friction.base_speeds, strict=False)
+        if any(slider.friction.base_speeds)
+    ]
     if not moving:
         return [still]
-    rows = np.array([system.vector_between(slider.at, slider.against) for slider in moving])
+    rows, speeds = (np.array(each) for each in zip(*moving, strict=True))
     carried = still.copy()
-    speeds = np.array([slider.friction.base_speed for slider in moving])
     carried[system.size :] = np.linalg.lstsq(rows, speeds, rcond=None)[0]
     return [still, carried]
 

@@ -345,7 +345,7 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
             return min(stop.gap for stop in points)
         return points[0].stiffness / points[0].share
     if name == BASE_SPEED:
-        return system.sliders[index].friction.base_speed
+        return system.sliders[index].friction.base_speeds[0]
     if name == "friction":
         return system.sliders[index].friction.coefficient
     if name in OF_ROUND:

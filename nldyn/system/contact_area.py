@@ -29,6 +29,9 @@ def contact_area(
     friction: Friction | float | None = None,
     tangents: Sequence[str] | None = None,
     tangents_against: Sequence[str] | None = None,
+    tangential_stiffness: float | None = None,
+    second_tangents: Sequence[str] | None = None,
+    second_tangents_against: Sequence[str] | None = None,
 ) -> tuple[Stop, ...]:
     r"""Stops at the points of a face or an edge, with one law of the pressure among them.
 
@@ -60,6 +63,10 @@ def contact_area(
         Coulomb's friction, see `Stop`.
     tangents, tangents_against : sequences of str, optional
         Interfaces of the same points whose displacement lies along the surface.
+    tangential_stiffness : float, optional
+        Of springs along the surface, see `Stop`; in N/m per area or length.
+    second_tangents, second_tangents_against : sequences of str, optional
+        The same as `tangents` perpendicular to them, of points that slide over a plane.
 
     Returns
     -------
@@ -95,6 +102,8 @@ def contact_area(
             ("against", against),
             ("tangents", tangents),
             ("tangents_against", tangents_against),
+            ("second_tangents", second_tangents),
+            ("second_tangents_against", second_tangents_against),
         )
     ]
     if not np.all(shares > 0.0):
@@ -115,8 +124,13 @@ def contact_area(
             tangent_against=beside,
             area=name,
             share=share,
+            tangential_stiffness=None
+            if tangential_stiffness is None
+            else tangential_stiffness * share,
+            second_tangent=across,
+            second_tangent_against=beside_across,
         )
-        for at, share, each, other, along, beside in zip(
+        for at, share, each, other, along, beside, across, beside_across in zip(
             points, shares.tolist(), gaps.tolist(), *others, strict=True
         )
     )

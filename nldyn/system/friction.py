@@ -28,8 +28,9 @@ class Friction:
         μ₀, at least μ; the same unless given.
     fading_speed : float, optional
         v₀ in m/s; needed where `at_rest` is larger.
-    base_speed : float
-        Speed in m/s at which what it slides on moves along: a belt, the surface of a rotor.
+    base_speed : float or (float, float)
+        Speed in m/s at which what it slides on moves along: a belt, the surface of a rotor; over a
+        plane along both tangents.
 
     Raises
     ------
@@ -51,12 +52,21 @@ class Friction:
     coefficient: float
     at_rest: float | None = None
     fading_speed: float | None = None
-    base_speed: float = 0.0
+    base_speed: float | tuple[float, float] = 0.0
 
     def __post_init__(self) -> None:
         owner = "friction"
         check_not_negative(owner, "coefficient", self.coefficient)
-        check_finite(owner, "base_speed", self.base_speed)
+        if isinstance(self.base_speed, list | tuple):
+            if len(self.base_speed) != 2:
+                raise SystemModelError(
+                    f"{owner}: base_speed must be a number, or one along each of two tangents, got "
+                    f"{len(self.base_speed)}"
+                )
+            first, second = self.base_speed
+            object.__setattr__(self, "base_speed", (first, second))
+        for speed in self.base_speeds:
+            check_finite(owner, "base_speed", speed)
         if self.at_rest is not None:
             check_finite(owner, "at_rest", self.at_rest)
             if self.at_rest < self.coefficient:
@@ -75,6 +85,16 @@ class Friction:
         """The same with another coefficient, at rest by as much another one."""
         at_rest = None if self.at_rest is None else coefficient + self.adhesion
         return replace(self, coefficient=coefficient, at_rest=at_rest)
+
+    @property
+    def base_speeds(self) -> tuple[float, float]:
+        """Speeds along both tangents of what it slides on."""
+        return self.base_speed if isinstance(self.base_speed, tuple) else (self.base_speed, 0.0)
+
+    def with_base_speed(self, speed: float) -> Friction:
+        """The same with another speed along the first tangent of what it slides on."""
+        both = (speed, self.base_speeds[1])
+        return replace(self, base_speed=both if isinstance(self.base_speed, tuple) else speed)
 
     @property
     def adhesion(self) -> float:
@@ -116,10 +136,19 @@ def across_of(second: str | None, against: str | None) -> Across:
 
 
 def check_plane(
-    owner: str, first: tuple[str | None, ...], across: Across, stiffness: float | None
+    owner: str,
+    first: tuple[str | None, ...],
+    across: Across,
+    stiffness: float | None,
+    law: Friction,
 ) -> None:
-    """Refuse a second tangent that is no interface of its own, or has no spring before it."""
+    """Refuse a second tangent that is no interface of its own, or has no spring before it.
+
+    And that of what it slides on, without a second tangent.
+    """
     if across is None:
+        if isinstance(law.base_speed, tuple):
+            raise SystemModelError(f"{owner}: a base_speed of two needs a second_tangent")
         return
     for name, end in zip(("second_tangent", "second_tangent_against"), across, strict=True):
         check_types(**{f"{owner}: {name}": (end, str, None)})
@@ -194,7 +223,8 @@ class DryFriction:
         check_positive(owner, "normal_force", self.normal_force)
         object.__setattr__(self, "friction", as_friction(owner, self.friction))
         check_spring(owner, self.tangential_stiffness, self.law)
-        check_plane(owner, (self.at, self.against), self.across, self.tangential_stiffness)
+        ends = (self.at, self.against)
+        check_plane(owner, ends, self.across, self.tangential_stiffness, self.law)
 
     @property
     def law(self) -> Friction:
@@ -235,7 +265,9 @@ class Slider:
     across: Across = None
 
     @property
-    def ends(self) -> tuple[tuple[str | None, str | None], ...]:
+    def ends(self) -> tuple[tuple[str, str | None], ...]:
         """The interface and that on the other side, along each tangent."""
         first = (self.at, self.against)
-        return (first,) if self.across is None else (first, self.across)
+        if self.across is None or self.across[0] is None:
+            return (first,)
+        return (first, (self.across[0], self.across[1]))

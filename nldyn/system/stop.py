@@ -384,7 +384,7 @@ class Stop:
         object.__setattr__(self, "friction", law)
         check_spring(owner, self.tangential_stiffness, law)
         first = (self.at, self.against, *ends)
-        check_plane(owner, first, across, self.tangential_stiffness)
+        check_plane(owner, first, across, self.tangential_stiffness, law)
 
     @property
     def across(self) -> Across:

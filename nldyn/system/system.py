@@ -461,9 +461,7 @@ class System:
         return (
             *at_stops,
             *(
-                Slider(
-                    d.at, d.against, d.law, -1, d.normal_force, d.tangential_stiffness, d.across
-                )
+                Slider(d.at, d.against, d.law, -1, d.normal_force, d.tangential_stiffness, d.across)
                 for d in dry
             ),
         )
@@ -578,7 +576,7 @@ class System:
             odd
             and all(stop.concentric for stop in self.round_stops.values())
             and all(bond.odd for bond in self.bonds)
-            and all(slider.friction.base_speed == 0.0 for slider in self.sliders)
+            and not self.carried
             and all(
                 sum(same == law and np.array_equal(c, vector) for c, same in stops)
                 == sum(same == law and np.array_equal(-c, vector) for c, same in stops)
@@ -773,7 +771,7 @@ class System:
     @property
     def carried(self) -> bool:
         """Whether something moves beneath its friction, such as a belt."""
-        return any(slider.friction.base_speed for slider in self.sliders)
+        return any(any(slider.friction.base_speeds) for slider in self.sliders)
 
     def response(self, omega: float, clock: Clock | None = None) -> ForcedResponse:
         """Linear response at ω (rad/s), near or at a resonance, too; the clock as for `forcing`."""
@@ -937,7 +935,7 @@ class System:
         if name == "coefficient":
             change = {"friction": slider.friction.with_coefficient(value)}
         elif name == "base_speed":
-            change = {"friction": replace(slider.friction, base_speed=value)}
+            change = {"friction": slider.friction.with_base_speed(value)}
         if slider.stop >= 0:
             stops = list(self.stops)
             pressing = stops[slider.stop]
@@ -978,6 +976,13 @@ class System:
                 raise SystemModelError(
                     f"friction at '{at}' acts on no motion: none of the {self.size} modes "
                     "moves there"
+                )
+        for number in self.over_planes:
+            slider = self.sliders[number]
+            if _rank([self.vector_between(*ends) for ends in slider.ends], self.size) < 2:
+                raise SystemModelError(
+                    f"friction at '{slider.at}' acts over no plane with '{slider.ends[1][0]}': in "
+                    f"the {self.size} modes both tangents are one motion, or none"
                 )
         for stop in self.rigid_stops.values():
             if not isinstance(stop.friction, Friction) or stop.tangent is None:
@@ -1043,7 +1048,7 @@ class System:
             for element in elements:
                 if not isinstance(element, classes):
                     raise SystemModelError(f"{kind} cannot be {shown(element)}")
-                for end, name in _ends_of(element):
+                for end, name in ends_of(element):
                     if kind == "excitation" and name in self.loads:
                         continue
                     if isinstance(element, BaseMotion):
@@ -1062,7 +1067,7 @@ class System:
                         )
 
 
-def _ends_of(element: Any) -> Iterator[tuple[str, str]]:
+def ends_of(element: Any) -> Iterator[tuple[str, str]]:
     """What the ends of an element are called, and the interfaces there."""
     tangents = ("tangent", "tangent_against", "second_tangent", "second_tangent_against")
     for end in ("at", "against", *tangents):

@@ -146,8 +146,9 @@ class FrictionTable(TwoEnds):
     fading_speed: Positive | None = None
     """[m/s] Speed in which the coefficient falls from that at rest by 1 − 1/e of the difference.
     Needed where `at_rest` is larger."""
-    base_speed: Number = 0.0
-    """[m/s] Speed along the surface of what it slides on: of a belt or a rotor."""
+    base_speed: Number | Annotated[list[Number], Field(min_length=2, max_length=2)] = 0.0
+    """[m/s] Speed along the surface of what it slides on: of a belt or a rotor; over a plane a list
+    of those along both tangents, or that along the first one."""
     against: str | None = None
     """Interface at the other side; the ground unless given."""
     tangential_stiffness: Positive | None = None
@@ -170,6 +171,8 @@ class FrictionTable(TwoEnds):
             raise ValueError("has a 'fading_speed', which needs the 'at_rest' that fades")
         if (self.at_rest or 0.0) > self.coefficient and self.tangential_stiffness is not None:
             raise ValueError("has a 'tangential_stiffness', before which 'at_rest' is no other one")
+        if self.second_tangent is None and isinstance(self.base_speed, list):
+            raise ValueError("has a 'base_speed' of two, which needs a 'second_tangent'")
         if self.second_tangent is None and self.second_tangent_against is not None:
             raise ValueError("has a 'second_tangent_against', which needs a 'second_tangent'")
         if self.second_tangent is not None and self.tangential_stiffness is None:
@@ -192,7 +195,9 @@ class FrictionTable(TwoEnds):
     @property
     def of_coulomb(self) -> Friction:
         """The law of the friction."""
-        return Friction(self.coefficient, self.at_rest, self.fading_speed, self.base_speed)
+        speed = self.base_speed
+        both = (speed[0], speed[1]) if isinstance(speed, list) else speed
+        return Friction(self.coefficient, self.at_rest, self.fading_speed, both)
 
     def made(self) -> DryFriction:
         """The friction of what a constant force presses on."""

@@ -269,6 +269,11 @@ class ContactAreaTable(Table):
     """Coefficient of Coulomb's friction at each point; needs `along`."""
     along: Axis | Triple | Annotated[list[str], Field(min_length=1)] | None = None
     """Axis or vector along the surface, in which it slides; of a list, interfaces."""
+    tangential_stiffness: Positive | None = None
+    """[N/m per m², m or point] Stiffness of a spring along the surface before what slides."""
+    second_along: Axis | Triple | Annotated[list[str], Field(min_length=1)] | None = None
+    """The same as `along` perpendicular to it, of points that slide over the plane of both. Needs
+    a `tangential_stiffness`."""
 
     @model_validator(mode="after")
     def _one_law(self) -> Self:
@@ -276,6 +281,10 @@ class ContactAreaTable(Table):
             refuse(self, ("exponent",), "law 'linear'")
         if (self.friction is None) != (self.along is None):
             raise ValueError("needs both 'friction' and 'along', or neither")
+        if self.along is None and self.tangential_stiffness is not None:
+            raise ValueError("has a 'tangential_stiffness', which needs 'friction' and 'along'")
+        if self.second_along is not None and self.tangential_stiffness is None:
+            raise ValueError("has 'second_along', which needs 'along' and a 'tangential_stiffness'")
         if not self.pulls and not self.dashpot:
             raise ValueError("has 'pulls = false', which needs a 'dashpot' above 0")
         return self
@@ -292,6 +301,7 @@ class MeshAreaTable(ContactAreaTable):
     at: str
     against: str | None = None
     along: Axis | Triple | None = None
+    second_along: Axis | Triple | None = None
     direction: Axis | Triple
     """Axis or vector of the normal, along which the structure moves to close the gap: `"y"`,
     `"-y"`, ..."""
@@ -341,6 +351,7 @@ class ListedAreaTable(ContactAreaTable):
     at: list[str]
     against: Annotated[list[str], Field(min_length=1)] | None = None
     along: Annotated[list[str], Field(min_length=1)] | None = None
+    second_along: Annotated[list[str], Field(min_length=1)] | None = None
     closes: Sign = 1
     """`1` if positive displacements close the gap, `-1` if negative ones
     do."""
@@ -348,6 +359,8 @@ class ListedAreaTable(ContactAreaTable):
     """[m², m] Areas or lengths that the interfaces stand for."""
     along_against: Annotated[list[str], Field(min_length=1)] | None = None
     """The interfaces of the other side in that direction, where there is `against`."""
+    second_along_against: Annotated[list[str], Field(min_length=1)] | None = None
+    """The same in the direction of `second_along`."""
 
     @field_validator("at")
     @classmethod
@@ -357,6 +370,7 @@ class ListedAreaTable(ContactAreaTable):
         return value
 
 
+ALONG = ("along", "along_against", "second_along", "second_along_against")  # keys of lists
 _MESH, _LIST = "an area of a mesh", "a list of interfaces"
 AnyAreaTable = Annotated[
     Annotated[MeshAreaTable, Tag(_MESH)] | Annotated[ListedAreaTable, Tag(_LIST)],

@@ -165,3 +165,30 @@ def test_what_makes_no_area_is_refused_in_a_sentence():
         FlowMap(wedge()).shoot(np.zeros((1, 4)), TURN, 8.0, parameters=[Parameter("area_friction")])
     with pytest.raises(SystemModelError, match="must be 0 at least"):
         Chart.of(Parameter("area_stiffness"), (-1.0, 2.0))
+
+
+def test_points_that_slide_over_a_plane_do_as_stops_with_their_shares():
+    modes = {"tip": [1.0, 0.3, 0.2], "along": [0.2, -0.7, 0.4], "across": [0.1, 0.5, 0.8]}
+    names = {f"{name}{i}": modes[name] for name in modes for i in range(2)}
+    law = {"exponent": 1.0, "gap": 0.1, "friction": 0.3}
+    edge = contact_area(
+        "edge", ["tip0", "tip1"], 50.0, weights=[0.5, 1.5], tangents=["along0", "along1"],
+        tangential_stiffness=20.0, second_tangents=["across0", "across1"], **law,
+    )  # fmt: skip
+    alone = [
+        Stop(
+            f"tip{i}", 50.0 * share, tangent=f"along{i}", second_tangent=f"across{i}",
+            tangential_stiffness=20.0 * share, **law,
+        )
+        for i, share in enumerate((0.5, 1.5))
+    ]  # fmt: skip
+    ends = []
+    for stops in (edge, alone):
+        system = System.from_modal(
+            [1.0, 2.1, 3.3], names, modal_damping=0.02, stops=stops,
+            excitation=[HarmonicForce("tip0", 10.0)],
+        )  # fmt: skip
+        flow = FlowMap(system)
+        start = flow.to_state(np.array([0.2, 0.1, 0.0, 1.0, 0.5, 1.0]))[None]
+        ends.append(flow.to_modal(flow.shoot(start, TURN, 8.0).ends[0]))
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-13)

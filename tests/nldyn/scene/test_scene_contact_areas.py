@@ -98,6 +98,10 @@ def test_a_list_of_interfaces_shares_a_law(tmp_path):
     rough = LISTED.replace("gap = [", 'friction = 0.2\nalong = ["slide", "tip"]\ngap = [')
     sliders = build_system(scene_of(tmp_path, rough)).sliders
     assert [(slider.at, slider.stop) for slider in sliders] == [("slide", 0), ("tip", 1)]
+    plane = 'tangential_stiffness = 8.0\nsecond_along = ["tip", "slide"]\ngap = ['
+    sliders = build_system(scene_of(tmp_path, rough.replace("gap = [", plane))).sliders
+    assert [slider.across for slider in sliders] == [("tip", None), ("slide", None)]
+    assert [slider.tangential_stiffness for slider in sliders] == [4.0, 2.0]
 
 
 def test_friction_beside_an_area_with_friction_is_followed_by_its_own_number(tmp_path):
@@ -126,6 +130,12 @@ def test_friction_beside_an_area_with_friction_is_followed_by_its_own_number(tmp
         ("weights = [0.5, 0.25]", "surface = 0.1", "surface is not a key of a list"),
         ("weights = [0.5, 0.25]", "closes = true", "must be 1 or -1"),
         ("weights = [0.5, 0.25]", "pulls = false", "needs a 'dashpot' above 0"),
+        ("weights = [0.5, 0.25]", "tangential_stiffness = 1.0", "needs 'friction' and 'along'"),
+        (
+            "weights = [0.5, 0.25]",
+            'friction = 0.1\nalong = ["tip", "tip"]\nsecond_along = ["slide", "slide"]',
+            "needs 'along' and a 'tangential_stiffness'",
+        ),
     ],
 )
 def test_what_makes_no_area_of_interfaces_is_refused(tmp_path, old, new, said):
@@ -148,6 +158,11 @@ def test_what_makes_no_area_of_interfaces_is_refused(tmp_path, old, new, said):
         ("radius = 20.0", "", "needs a 'slope' or a 'radius'"),
         ("points = 2", "points = 2\nsurface_against = 0.01", "which needs 'against'"),
         ("points = 2", "attachment_modes = 3\nstatic_error = 0.1", "keep one"),
+        (
+            "points = 2",
+            'friction = 0.1\nalong = "x"\ntangential_stiffness = 1e3\nsecond_along = [0, 1, 0]',
+            "'second_along' must be perpendicular to 'direction'",
+        ),
     ],
 )
 def test_what_makes_no_area_of_a_mesh_is_refused(tmp_path, old, new, said):

@@ -130,6 +130,15 @@ second_tangent = "{second}"
 """
 
 
+def test_what_it_slides_on_moves_along_both_tangents_of_a_plane(tmp_path):
+    belt = over_a_plane() + "base_speed = [0.1, -0.2]\n"
+    slider = build_system(with_third(tmp_path, belt)).sliders[0]
+    assert slider.friction.base_speeds == (0.1, -0.2)
+    assert "base at 0.1 and -0.2 m/s" in describe_slider(slider)
+    with pytest.raises(SceneError, match="'base_speed' of two, which needs a 'second_tangent'"):
+        with_third(tmp_path, AT_STOP.replace("0.2", "[0.1, 0.2]"))
+
+
 def over_a_plane(stop=0, second="aside"):
     return OVER_A_PLANE.format(stop=stop, second=second)
 
