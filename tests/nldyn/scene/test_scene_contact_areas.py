@@ -186,3 +186,13 @@ def test_what_the_points_stand_for_is_told_with_its_unit(caplog):
     with caplog.at_level("INFO", logger="nldyn"):
         build_reduced(load_scene(example("landing_strip.toml")))
     assert "contact area 'support': 20 points that stand for 0.3 m;" in caplog.text
+
+
+def test_a_second_tangent_along_the_first_one_is_refused(tmp_path):
+    place = '[interfaces.tip]\nat = "tip"\n'
+    again = place.replace(".tip", ".{}") + 'direction = "{}"\n'
+    rubs = '[[friction]]\nat = "side"\ncoefficient = 0.1\nnormal_force = 1.0\n'
+    rubs += 'tangential_stiffness = 1.0\nsecond_tangent = "again"\n'
+    more = again.format("side", "x") + again.format("again", "x") + rubs
+    with pytest.raises(SceneError, match="lies along 'x' as 'side', and must be perpendicular"):
+        landing(tmp_path, (place, more + place))
