@@ -44,6 +44,12 @@ class Contact:
         n = self.tangent.size
         return float(self.tangent @ y[n : 2 * n]) - self.law.base_speed
 
+    def sliding_share(self, y: Vector) -> float:
+        """Friction per normal force as it slides, from the first instant on."""
+        if self.law.fading_speed is None:
+            return self.law.coefficient
+        return float(self.law.at(self.slip(y)))
+
     def pressing_pace(self, y: Vector) -> float:
         if self.normal is None or self.depth(y) <= 0.0:
             return 0.0
@@ -108,8 +114,7 @@ class Body:
             elif mode == 0.0:
                 held.append(i)
             elif not np.isnan(mode):
-                law = float(contact.law.at(contact.slip(y)))
-                total = total - contact.tangent * mode * law * normal
+                total = total - contact.tangent * mode * contact.sliding_share(y) * normal
         if not held:
             return total, {}
         rows = np.array([self.contacts[i].tangent for i in held])
@@ -210,6 +215,7 @@ class Body:
                 held = other.spring is not None and self.modes[j] == 0.0
                 if held and self._margin(t, y, j) < 1e-9 * self.grip(j, y):
                     self.modes[j] = self.sprung_mode(j, y)
+            self.let_slip(t, y)  # forces jump where friction drops
         elif kind == "switch":
             opens = not np.isnan(self.modes[i])
             self.modes[i] = np.nan if opens else self.pressed_mode(contact, y)

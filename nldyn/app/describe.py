@@ -252,7 +252,11 @@ def describe_slider(slider: Slider, length: str = "m") -> str:
         where += f", over the plane with '{slider.across[0]}'"
         where += f" against '{slider.across[1]}'" if slider.across[1] else ""
     told = f"friction {where}: coefficient {law.coefficient:.6g}"
-    told += f", at rest {law.at_rest:.6g}" if law.adhesion else ""
+    if law.adhesion:
+        told += f", at rest {law.at_rest:.6g}, from which it "
+        told += (
+            f"falls over {law.fading_speed:.6g} {length}/s" if law.fading_speed else "drops at once"
+        )
     if any(law.base_speeds):
         speeds = law.base_speeds if slider.across else law.base_speeds[:1]
         told += f", base at {' and '.join(f'{speed:.6g}' for speed in speeds)} {length}/s"

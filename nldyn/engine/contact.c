@@ -129,10 +129,10 @@ static int reach_aim(Motion *M, Trial *trial, bool event, bool fine)
     bool there = fabs(off) <= gap_noise(fl, out, M->w);
     if (rubs(fl, aim)) {
         dh = time_to_slip(M, aim, trial->kind, end_phase, h, &off);
-        there = fabs(dh) <= RELEASED * h ||
-                (is_sprung(fl, aim) && fabs(dh) <= SUM_ROUNDING * end_phase / fl->omega) ||
-                (is_strained(fl, aim) && fabs(off) <= strain_noise(fl, aim, w)) ||
-                (fl->slides[aim] != 0 && fabs(off) <= slip_noise(fl, aim, w, end_phase));
+        double noise = fl->slides[aim] != 0 ? slip_noise(fl, aim, w, end_phase)
+                                            : hold_noise(fl, aim, w);
+        there = fabs(dh) <= RELEASED * h || fabs(off) <= noise ||
+                (is_sprung(fl, aim) && fabs(dh) <= SUM_ROUNDING * end_phase / fl->omega);
     } else if (ends_smoothly(fl, aim, M->closed)) {
         dh = time_to_release(M->tab, aim, trial->kind, h, M->panel);
         there = fabs(dh) <= RELEASED * h;

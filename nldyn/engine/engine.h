@@ -81,7 +81,7 @@ typedef struct {
     double release;     /* output δ + δ' dashpot/stiffness of a stop that never pulls, or -1 */
     double friction;    /* of a slider: coefficient while it slides; -1 for what is none */
     double adhesion;    /* by how much more it is at rest */
-    double fading;      /* speed in which that falls to 1/e; 0 for at once: there is none */
+    double fading;      /* speed in which that falls to 1/e; 0 for at once */
     double belt;        /* speed of what it slides on */
     double normal;      /* stop whose force presses it on, or -1 */
     double pressing;    /* force that does so in place of a stop's */
@@ -246,6 +246,7 @@ typedef struct {
     double *viscosity, *off, *hold_matrix, *shift, *kick; /* hold_speeds */
     int *hold_order;
     double *forces, *part, *change;                    /* panel_columns */
+    double *last_forces; /* (n_stops, 1 + n_columns) see `fill_last_force` */
     double *pushed, *carried, *added, *driven_many, *flown, *pushing, *showing; /* many stops */
     double *stop_forces, *pushes, *first_pushes, *held, *mobility; /* rigid stops */
     double *across; /* (n_stops,) see `fill_across` */

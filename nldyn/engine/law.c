@@ -100,7 +100,7 @@ static Value friction_at(const Flow *fl, int s, double speed)
 {
     const Stop *slider = stop_of(fl, s);
     int way = fl->slides[s];
-    if (slider->adhesion == 0.0) return (Value){way * slider->friction, 0.0};
+    if (slider->fading == 0.0) return (Value){way * slider->friction, 0.0};
     double more = slider->adhesion * exp(-way * (speed - slider->belt) / slider->fading);
     return (Value){way * (slider->friction + more), -more / slider->fading};
 }
@@ -110,6 +110,12 @@ static double grip(const Flow *fl, int s)
 {
     if (is_second(fl, s)) return stop_of(fl, s)->rub;
     return stop_of(fl, s)->friction + stop_of(fl, s)->adhesion;
+}
+
+/* whether that drops at once as it begins to slide */
+static bool drops_at_once(const Flow *fl, int s)
+{
+    return is_slider(fl, s) && stop_of(fl, s)->adhesion > 0.0 && stop_of(fl, s)->fading == 0.0;
 }
 
 /* whether a stop with a dashpot lets go where its force would pull */

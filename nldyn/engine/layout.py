@@ -43,7 +43,7 @@ class StopRow(NamedTuple):
     release: float = -1.0  # output δ + δ' dashpot/stiffness of a stop that never pulls, or -1
     friction: float = -1.0  # of a slider: coefficient while it slides; -1 for what is none
     adhesion: float = 0.0  # by how much more it is at rest
-    fading: float = 0.0  # speed in which that falls to 1/e; 0 where there is none
+    fading: float = 0.0  # speed in which that falls to 1/e; 0 for at once
     belt: float = 0.0  # speed of what it slides on
     normal: float = -1.0  # stop whose force presses it on, or -1
     pressing: float = 0.0  # force that does so in place of a stop's

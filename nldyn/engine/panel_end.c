@@ -157,6 +157,28 @@ static void add_node_columns(const Flow *fl, double node_phase, double t, const 
     }
 }
 
+/* whether friction at any slider drops at once */
+static bool any_drops(const Flow *fl)
+{
+    for (int s = 0; s < fl->n_stops; s++)
+        if (drops_at_once(fl, s)) return true;
+    return false;
+}
+
+/* fill s->last_forces of a stop with the rate and the sensitivities of its force at the end of a
+ * panel, of a length h without a switch at its end: those at the nodes are in s->part (m, n_columns) */
+static void fill_last_force(const Gauss *tab, int kind, double h, const Panel *panel, int a,
+                            int n_columns, Scratch *s)
+{
+    int m = panel->m;
+    double *found = s->last_forces + (size_t)panel->active[a] * (1 + n_columns);
+    found[0] = slope_at_end(tab, panel->F + (size_t)a * m) / (h * (kind == 0 ? 1.0 : tab->power));
+    for (int c = 0; c < n_columns; c++) {
+        for (int i = 0; i < m; i++) s->inner[i] = s->part[i * n_columns + c];
+        found[1 + c] = at_end(tab, s->inner);
+    }
+}
+
 /* Advance sensitivities (2n, n_columns) in place over a panel.
  *
  * After those of the start come the derivatives with respect to parameters; the last column is
@@ -166,6 +188,7 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
                           double h, Panel *panel, double *columns, int n_columns, Scratch *s)
 {
     int na = panel->na, m = panel->m, width = na * m;
+    bool drops = any_drops(fl);
     memset(s->forces, 0, sizeof(double) * width * n_columns);
     for (int o = 0; o < panel->outputs; o++) {
         multiply_transposed(fl->watch, panel->to + (size_t)o * m * fl->size, m, columns, s->part,
@@ -190,6 +213,7 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
         else
             multiply_transposed(fl->watch, panel->inverse + a * m, padded(width), s->forces,
                                 s->part, m, width, n_columns);
+        if (drops) fill_last_force(tab, kind, h, panel, a, n_columns, s);
         for (int j = 0; j < m; j++) {
             double *part = s->part + (size_t)j * n_columns, weight = h * tab->weights[kind * m + j];
             for (int c = 0; c < n_columns; c++) part[c] *= weight;

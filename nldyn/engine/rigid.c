@@ -512,8 +512,48 @@ static void begin_sliders(Motion *M)
     hold(M, M->phase, 0.0, M->s->moved_shift);
 }
 
-/* A slider comes to rest, or slips, a time t after the start. Its force jumps as it comes to rest:
- * sensitivities change as in an impact, by the shift of that instant. */
+/* fill `shift` (n_columns,): change of the instant at which the force that holds a slider reaches its
+ * friction, to one `way` */
+static void slip_shift(const Motion *M, int s, int way, double phase, double *shift)
+{
+    const Flow *fl = M->fl;
+    int n = M->n_columns, stop = (int)stop_of(fl, s)->normal;
+    const double *held = M->s->last_forces + (size_t)s * (1 + n);
+    double pace = -way * held[0], most = grip(fl, s);
+    for (int c = 0; c < n; c++) shift[c] = -way * held[1 + c];
+    if (is_pressed(fl, s)) {
+        const double *pressed = M->s->last_forces + (size_t)stop * (1 + n);
+        pace += most * pressed[0];
+        for (int c = 0; c < n; c++) shift[c] += most * pressed[1 + c];
+    }
+    for (int c = 0; c < fl->n_parameters; c++) {
+        if (is_parameter(fl, c, PRESSING, s)) shift[fl->size + c] += most;
+        if (is_parameter(fl, c, FRICTION, s))
+            shift[fl->size + c] += pressing_now(fl, s, M->w, phase).value;
+    }
+    for (int c = 0; c < n; c++) shift[c] /= -pace;
+}
+
+/* Let a slider slide one `way`, or stick, from an instant on that shifts: forces jump there, those of
+ * others with it. Their rates before the jump are in s->stop_forces. */
+static void jump_to(Motion *M, int s, int way, double phase, double t, const double *shift)
+{
+    if (M->with_columns) {
+        state_rate(M);
+        move(M, 1.0, shift);
+    }
+    M->fl->slides[s] = way;
+    slip_overloaded(M, phase);
+    hold(M, phase, t, shift);
+    if (!M->with_columns) return;
+    contact_forces(M, phase);
+    state_rate(M);
+    move(M, -1.0, shift);
+}
+
+/* A slider comes to rest, or slips, a time t after the start. Its force jumps as it comes to rest,
+ * and where its friction drops as it slips: sensitivities change as in an impact, by the shift of
+ * that instant. */
 static void slide_or_stick(Motion *M, int s, double phase, double t)
 {
     const Flow *fl = M->fl;
@@ -524,26 +564,24 @@ static void slide_or_stick(Motion *M, int s, double phase, double t)
         set_slides(fl, s, 0);
         return;
     }
+    for (int c = 0; c < M->n_columns; c++) shift[c] = 0.0;
     if (fl->slides[s] == 0) {
-        fl->slides[s] = held_force(M, s) > 0.0 ? 1 : -1;
+        int way = held_force(M, s) > 0.0 ? 1 : -1;
+        if (drops_at_once(fl, s)) {
+            if (M->with_columns) slip_shift(M, s, way, phase, shift);
+            jump_to(M, s, way, phase, t, shift);
+            return;
+        }
+        fl->slides[s] = way;
         if (is_disc(fl, s)) set_slides(fl, s, 1);
         return;
     }
     double pace = held_pace(M, s, M->s->pushes, phase);
-    for (int c = 0; c < M->n_columns; c++) shift[c] = 0.0;
     if (M->with_columns) {
-        state_rate(M);
         held_columns(M, s, phase, t, shift, M->s->moved);
         for (int c = 0; c < M->n_columns; c++) shift[c] = -M->s->moved[c] / pace;
-        move(M, 1.0, shift);
     }
-    fl->slides[s] = 0;
-    slip_overloaded(M, phase);
-    hold(M, phase, t, shift);
-    if (!M->with_columns) return;
-    contact_forces(M, phase);
-    state_rate(M);
-    move(M, -1.0, shift);
+    jump_to(M, s, 0, phase, t, shift);
 }
 
 /* close the rigid stops that are shut and do not part; a body that an impact on another stop has

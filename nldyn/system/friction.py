@@ -14,11 +14,12 @@ from nldyn.system.values import check_ends, check_finite, check_not_negative, ch
 
 @dataclass(frozen=True)
 class Friction:
-    r"""Coefficient of Coulomb's friction, which may fall with the speed of sliding.
+    r"""Coefficient of Coulomb's friction, which may be larger at rest than of sliding.
 
+    At rest friction is what it must be to stay, up to :math:`\mu_0` times the normal force. From
+    there it drops to :math:`\mu` at once or, with a fading speed, falls by
     :math:`\mu(v) = \mu + (\mu_0 - \mu)\,e^{-|v|/v_0}`, with v the speed beside that of what it
-    slides on. At rest friction is what it must be to stay, up to :math:`\mu_0` times the normal
-    force.
+    slides on.
 
     Parameters
     ----------
@@ -27,7 +28,7 @@ class Friction:
     at_rest : float, optional
         μ₀, at least μ; the same unless given.
     fading_speed : float, optional
-        v₀ in m/s; needed where `at_rest` is larger.
+        v₀ in m/s. Unless given, friction drops at once where sliding begins.
     base_speed : float or (float, float)
         Speed in m/s at which what it slides on moves along: a belt, the surface of a rotor; over a
         plane along both tangents.
@@ -35,17 +36,20 @@ class Friction:
     Raises
     ------
     SystemModelError
-        For a value out of range, or a larger coefficient at rest without a fading speed.
+        For a value out of range.
 
     References
     ----------
     R. Stribeck (1902), *Z. VDI* 46; B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit (1994),
-    *Automatica* 30, 1083-1138, for the law.
+    *Automatica* 30, 1083-1138, for the law; S. W. Shaw (1986), *J. Sound Vib.* 108, 305-325, for
+    the drop.
 
     Examples
     --------
     >>> falling = Friction(0.2, at_rest=0.3, fading_speed=0.1)
     >>> falling.at([0.0, 1e9]).tolist()
+    [0.3, 0.2]
+    >>> Friction(0.2, at_rest=0.3).at([0.0, 1e-9]).tolist()
     [0.3, 0.2]
     """
 
@@ -76,10 +80,6 @@ class Friction:
                 )
         if self.fading_speed is not None:
             check_positive(owner, "fading_speed", self.fading_speed)
-        if self.adhesion > 0.0 and self.fading_speed is None:
-            raise SystemModelError(
-                "friction: at_rest above the coefficient needs a fading_speed, in which it falls"
-            )
 
     def with_coefficient(self, coefficient: float) -> Friction:
         """The same with another coefficient, at rest by as much another one."""
@@ -103,7 +103,7 @@ class Friction:
 
     def at(self, speed: ArrayLike) -> Real:
         """Coefficient at speeds of sliding in m/s, of either sign."""
-        slow = np.zeros(np.shape(speed))
+        slow = np.equal(speed, 0.0)
         if self.fading_speed is not None:
             slow = np.exp(-np.abs(speed) / self.fading_speed)
         return np.asarray(self.coefficient + self.adhesion * slow)
@@ -123,7 +123,8 @@ def check_spring(owner: str, stiffness: float | None, law: Friction) -> None:
     if law.adhesion:
         raise SystemModelError(
             f"{owner}: behind a tangential_stiffness friction has one coefficient, at rest and "
-            "sliding: leave out at_rest and fading_speed, or the tangential_stiffness"
+            "sliding, since nothing tells how far the spring leaps where it drops: leave out "
+            "at_rest and fading_speed, or the tangential_stiffness"
         )
 
 

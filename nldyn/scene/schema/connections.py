@@ -145,7 +145,7 @@ class FrictionTable(TwoEnds):
     """Coefficient at rest, at least `coefficient`; the same unless given."""
     fading_speed: Positive | None = None
     """[m/s] Speed in which the coefficient falls from that at rest by 1 − 1/e of the difference.
-    Needed where `at_rest` is larger."""
+    Unless given, it drops at once where sliding begins."""
     base_speed: Number | Annotated[list[Number], Field(min_length=2, max_length=2)] = 0.0
     """[m/s] Speed along the surface of what it slides on: of a belt or a rotor; over a plane a list
     of those along both tangents, or that along the first one."""
@@ -165,8 +165,6 @@ class FrictionTable(TwoEnds):
         exactly_one(self, "normal_force", "stop")
         if self.at_rest is not None and self.at_rest < self.coefficient:
             raise ValueError("needs an 'at_rest' of at least 'coefficient'")
-        if (self.at_rest or 0.0) > self.coefficient and self.fading_speed is None:
-            raise ValueError("has an 'at_rest' above 'coefficient', which needs a 'fading_speed'")
         if self.at_rest is None and self.fading_speed is not None:
             raise ValueError("has a 'fading_speed', which needs the 'at_rest' that fades")
         if (self.at_rest or 0.0) > self.coefficient and self.tangential_stiffness is not None:

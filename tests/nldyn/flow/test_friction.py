@@ -80,19 +80,20 @@ def test_den_hartogs_amplitude_of_motion_without_stops(ratio, share):
     assert work == pytest.approx(4.0 * share * amplitude, rel=1e-5)  # of the trapezoids
 
 
-def drawn(seed, walled=False):
+def drawn(seed, walled=False, drops=False):
     """A random structure with friction at stops and all the time, the same for both ways."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 4))
     A = rng.normal(size=(n, n))
-    M, K = np.diag(rng.uniform(0.5, 2.0, n)), A @ A.T + np.eye(n)
+    M, K = np.diag(rng.uniform(0.5, 2.0, n)) + 0.2 * drops, A @ A.T + np.eye(n)
     C, names, unit = 0.05 * K + 0.02 * M, [f"x{i}" for i in range(n)], np.eye(n)
     omega, forces, phases = rng.uniform(0.5, 2.0), 3.0 * rng.random(n), rng.uniform(0.0, 360.0, n)
     contacts, stops, dry, walls = [], [], [], []
     for b in rng.permutation(n)[: int(rng.integers(1, n + 1))]:
         law = Friction(float(rng.uniform(0.05, 0.8)), base_speed=float(rng.choice([0.0, 0.3])))
-        if rng.random() < 0.4:
-            law = Friction(law.coefficient, 1.5 * law.coefficient, 0.2, law.base_speed)
+        if rng.random() < 0.4 or drops:
+            fading = None if drops else 0.2
+            law = Friction(law.coefficient, 1.5 * law.coefficient, fading, law.base_speed)
         if rng.random() < 0.5:
             force = float(rng.uniform(0.3, 2.0))
             contacts.append(Contact(unit[b], law, force))
@@ -117,8 +118,8 @@ def drawn(seed, walled=False):
     return system, body, omega, 0.7 * rng.normal(size=2 * n), float(rng.uniform(1.0, 3.0))
 
 
-def agrees(seed, walled=False):
-    system, body, omega, start, turns = drawn(seed, walled)
+def agrees(seed, walled=False, drops=False):
+    system, body, omega, start, turns = drawn(seed, walled, drops)
     phases = np.array([0.0, 2.0 * math.pi * turns])
     expected, _ = body.followed(start, phases[1] / omega, 0.2 / omega)
     flow, z = FlowMap(system), to_state(system, start)[None]
@@ -156,6 +157,17 @@ def test_impacts_on_rigid_stops_turn_what_slides(seed):
     agrees(seed, walled=True)
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_random_systems_whose_friction_drops_at_once_agree(seed):
+    agrees(seed, drops=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10, 50))
+def test_more_random_systems_whose_friction_drops_at_once_agree(seed):
+    agrees(seed, drops=True)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20, 320))
 def test_more_random_systems_agree(seed):
@@ -163,14 +175,17 @@ def test_more_random_systems_agree(seed):
 
 
 @pytest.mark.parametrize(("name", "index"), [("friction", 0), ("friction", 1), ("normal_force", 1)])
-def test_derivatives_by_the_numbers_of_sliders_are_those_of_differences(name, index):
+@pytest.mark.parametrize(
+    "laws", [(Friction(0.3, 0.5, 0.2), 0.4), (Friction(0.3, 0.5), Friction(0.4, 0.6))]
+)
+def test_derivatives_by_the_numbers_of_sliders_are_those_of_differences(name, index, laws):
     system = System.from_matrices(
         np.diag([1.0, 2.0]),
         [[3.0, -1.0], [-1.0, 2.0]],
         {"x": [1.0, 0.0], "y": [0.0, 1.0]},
         modal_damping=0.02,
-        stops=[Stop("x", 50.0, 1.5, 0.1, friction=Friction(0.3, 0.5, 0.2), tangent="y")],
-        dampers=[DryFriction("x", 0.3, 0.4)],
+        stops=[Stop("x", 50.0, 1.5, 0.1, friction=laws[0], tangent="y")],
+        dampers=[DryFriction("x", 0.3, laws[1])],
         excitation=[HarmonicForce("x", 2.0), HarmonicForce("y", 1.0)],
     )
     parameter, step = Parameter(name, index), 1e-6
@@ -263,7 +278,11 @@ def test_friction_of_zero_changes_nothing():
     [
         (lambda: Friction(-0.1), "coefficient must not be negative"),
         (lambda: Friction(0.2, 0.1, 1.0), "at_rest must be at least"),
-        (lambda: Friction(0.2, 0.3), "needs a fading_speed"),
+        (lambda: Friction(0.2, 0.1), "at_rest must be at least"),
+        (
+            lambda: DryFriction("x", 1.0, Friction(0.2, 0.3), tangential_stiffness=1.0),
+            "nothing tells how far the spring leaps",
+        ),
         (lambda: DryFriction("x", 0.0, 0.2), "normal_force must be positive"),
         (lambda: DryFriction("x", 1.0, 0.2, "x"), "against must be another"),
         (lambda: Stop("x", 1.0, friction=0.2), "needs both friction and tangent"),

@@ -9,18 +9,27 @@ from den_hartog import response, with_two_stops
 from scipy.optimize import brentq
 from sliding import Body, Contact, Wall
 
-from nldyn import FlowMap, HarmonicForce, RigidStop, Stop, System, solve_orbit
+from nldyn import (
+    FlowMap,
+    HarmonicForce,
+    RigidStop,
+    Stop,
+    System,
+    continue_branch,
+    solve_orbit,
+)
 from nldyn.flow.sliding import slider_measures
 from nldyn.system import DryFriction, Friction
 
 TURN = 2.0 * math.pi
 
 
-def block(share, *, damping=0.0, stops=()):
+def block(share, rest=None, *, damping=0.0, stops=()):
     """Mass 1 on a spring 1, pressed on by 1 N and pulled by 1 N to and fro."""
     return System.from_matrices(
         [[1.0]], [[1.0]], {"x": [1.0]}, damping=[[damping]], stops=stops,
-        dampers=[DryFriction("x", 1.0, share)], excitation=[HarmonicForce("x", 1.0)],
+        dampers=[DryFriction("x", 1.0, Friction(share, rest))],
+        excitation=[HarmonicForce("x", 1.0)],
     )  # fmt: skip
 
 
@@ -59,6 +68,57 @@ def test_two_stops_a_cycle_are_those_of_pieces_in_closed_form(ratio, share):
     assert orbit.max_abs_displacement == pytest.approx(known.top, rel=1e-9)
     assert found.stuck == pytest.approx(known.rests, abs=1e-8)
     assert found.loss == pytest.approx(4.0 * share * known.top, rel=1e-9)
+
+
+SHAW = [(0.6, 0.5, 0.6), (0.5, 0.4, 0.6), (0.5, 0.6, 0.8), (0.7, 0.7, 0.8), (0.45, 0.7, 0.9)]
+
+
+@pytest.mark.parametrize(("ratio", "share", "rest"), SHAW)
+def test_two_stops_with_more_friction_at_rest_are_those_of_pieces_in_closed_form(
+    ratio, share, rest
+):
+    """S. W. Shaw (1986): the place of a stop tells the next one, by half a cycle's slope."""
+    known = with_two_stops(ratio, share, rest)
+    orbit = solve_orbit(block(share, rest), ratio / TURN)
+    assert orbit.max_abs_displacement == pytest.approx(known.top, rel=1e-9)
+    assert orbit.friction[0].stuck == pytest.approx(known.rests, abs=1e-8)
+    assert orbit.friction[0].loss == pytest.approx(4.0 * share * known.top, rel=1e-9)
+    largest, least = sorted(np.abs(orbit.multipliers), reverse=True)
+    assert largest == pytest.approx(known.slope**2, abs=1e-8)
+    assert least < 1e-12  # what sticks forgets its speed
+
+
+def test_more_friction_at_rest_takes_the_stability_of_two_stops():
+    """There half a cycle changes the place of a stop by as much as that before it was changed."""
+    start = solve_orbit(block(0.4, 0.8), 0.5 / TURN)
+    branch = continue_branch(start, (0.5 / TURN, 0.65 / TURN))
+    (lost,) = branch.special_points
+
+    def slope(ratio):
+        return with_two_stops(ratio, 0.4, 0.8).slope ** 2 - 1.0
+
+    assert lost.kind == "BP"
+    turned = brentq(slope, 0.55, 0.65, xtol=1e-14)
+    assert TURN * lost.frequency_hz == pytest.approx(turned, rel=1e-9)
+    last = branch.points[-1]
+    known = with_two_stops(0.65, 0.4, 0.8)
+    assert not last.stable
+    assert last.max_abs_displacement == pytest.approx(known.top, rel=1e-8)
+    assert np.abs(last.multipliers).max() == pytest.approx(known.slope**2, rel=1e-6)
+
+
+@pytest.mark.parametrize(("ratio", "larger"), [(0.6, 1.2), (0.7, 1.2), (0.7, 2.0)])
+def test_more_friction_at_rest_stops_what_turns_with_less_force(ratio, larger):
+    """Without stops it turns with the force β² k X, whatever friction would be at rest."""
+    size, swing = response(ratio)
+    limit = size / math.hypot(swing, larger / ratio**2)
+    before, behind = (
+        solve_orbit(block(share, larger * limit), ratio / TURN)
+        for share in (limit * (1.0 - 1e-5), limit * (1.0 + 1e-5))
+    )
+    assert before.friction[0].stuck == 0.0
+    assert 0.0 < behind.friction[0].stuck < 0.01
+    assert before.max_abs_displacement == pytest.approx(larger * limit / ratio**2, rel=5e-4)
 
 
 @pytest.mark.parametrize(("ratio", "share"), [(0.8, 0.3), (0.5, 0.6)])

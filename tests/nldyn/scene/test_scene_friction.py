@@ -95,6 +95,13 @@ def test_a_rigid_stop_has_friction_of_one_coefficient_without_a_spring(tmp_path)
         build_system(scene_with(tmp_path, plain + "tangential_stiffness = 7.0\n"))
 
 
+def test_without_a_fading_speed_friction_drops_at_once(tmp_path):
+    system = build_system(scene_with(tmp_path, AT_STOP.replace("fading_speed = 0.1\n", "")))
+    assert system.stops[0].friction == Friction(0.3, at_rest=0.4, base_speed=0.2)
+    told = "coefficient 0.3, at rest 0.4, from which it drops at once, base at 0.2 m/s"
+    assert told in describe_slider(system.sliders[0])
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
@@ -104,7 +111,6 @@ def test_a_rigid_stop_has_friction_of_one_coefficient_without_a_spring(tmp_path)
         ({"stop = 0": "stop = 0\nnormal_force = 1.0"}, "has both 'normal_force' and 'stop'"),
         ({"stop = 0": "stop = 1"}, "friction of a rigid stop has one coefficient"),
         ({"stop = 0": "stop = 2"}, "no stop has that number; there are 2"),
-        ({"fading_speed = 0.1": ""}, "needs a 'fading_speed'"),
         ({"at_rest = 0.4": ""}, "needs the 'at_rest' that fades"),
         ({"at_rest = 0.4": "at_rest = 0.2"}, "'at_rest' of at least"),
         ({"0.3": "-0.3"}, "coefficient"),
