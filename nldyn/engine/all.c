@@ -7,6 +7,7 @@
 #include "terms.c"
 #include "response.c"
 #include "outputs.c"
+#include "coupled.c"
 #include "law.c"
 #include "round.c"
 #include "flights.c"

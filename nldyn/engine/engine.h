@@ -123,6 +123,7 @@ typedef struct {
     const int64_t *laws;  /* (n_stops,) address of a law (of a rigid stop's restitution), or 0 */
     double tail;          /* largest relative Legendre tail accepted on a contact panel */
     double node_angle;    /* phase of the fastest mode from node to node, in rad */
+    const double *common; /* (n_stops, n_stops) how far a unit force at one moves another at once */
 } System;
 
 /* Collocation tables of panels with m nodes, by kind: 2 (switch at start) + (switch at end). */
@@ -191,6 +192,13 @@ typedef struct {
     /* (n_parameters, 2) column of `stops`, or -1; index of the stop, or -2 - number of an area */
     const int64_t *parameters;
     double omega, tail, node_angle;
+    /* of stops that move each other at once, see coupled.c; missing where there are none */
+    const System *plain;
+    double *own_rows, *own_stops; /* `rows` and `stops` are then these */
+    double *give;      /* (n_stops, n_stops) `common` with the forces of the closed ones */
+    bool *coupled;     /* (n_stops,) whether others move it */
+    bool *counted;     /* (n_stops,) closed ones that the rows know of */
+    int *pivots;       /* (1,) since they were the stops' own */
     Turn *turns; /* (2,) of the last phases that outputs were asked for at: mostly the same again */
     Watch *watch;
 } Flow;
@@ -255,6 +263,7 @@ typedef struct {
     double *rate, *moved, *moved_shift, *along, *along_columns, *offsets;
     double *closing, *sliding, *pull; /* strike, hold */
     bool *struck, *still;
+    bool *was_open; /* (n_stops,) before an event */
 } Scratch;
 
 /* A motion over one segment. */

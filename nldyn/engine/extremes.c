@@ -27,7 +27,9 @@ typedef struct {
     Square *steps, *now; /* (n,) exponentials over a sample, and from the start to the one at hand */
     Complex turn, turn_step; /* e^{iωt} at the sample at hand, and over a sample */
     int64_t n_samples, kept; /* of the piece at hand; with which `weights` were made */
-    int sign, first_sign;
+    int out, sign, first_sign;
+    bool *closed; /* (n_stops,) in the piece at hand, where stops are coupled */
+    double shift; /* gap of a coupled stop, less that which its row has there */
     double first_value;
     double t_old, rate_old, t_older, rate_older;
     Extreme *found; /* (capacity,) */
@@ -41,7 +43,7 @@ static Value moving_rate(const Search *S, const Moving *moving, double t, Comple
 {
     double omega = S->fl.omega, phase = S->piece.phase + omega * t;
     Complex swing = product(moving->forced[0], turn);
-    Value found = {swing.re, -omega * swing.im};
+    Value found = {swing.re + S->shift, -omega * swing.im};
     for (int k = 0; k < S->n_terms; k++) {
         TermCourse e = term_since(S->terms + k, omega, phase, t);
         found.value += product(moving->forced[1 + k], e.value).re;
@@ -268,12 +270,40 @@ static void look_at(Search *S, int64_t n, int64_t i, double t)
     S->rate_old = at.slope;
 }
 
+/* terms and rows of the output's directions, with what is closed in a piece */
+static void show_output(Search *S, const int *rows)
+{
+    const Flow *fl = &S->fl;
+    for (int d = 0; d < 2; d++) {
+        S->moving[d].row = row_of(fl, 0, rows[d]);
+        S->moving[d].row1 = row_of(fl, 1, rows[d]);
+        for (int p = 0; p <= fl->n_terms; p++) S->moving[d].forced[p] = forced_of(fl, p, 0, rows[d]);
+    }
+}
+
+/* the same of a coupled stop in a recorded piece: those are closed that have penetrations there */
+static void couple_in_piece(Search *S, const Recorded *piece)
+{
+    const Flow *fl = &S->fl;
+    int m = (int)S->piece.tab->m, rows[2] = {S->out, S->out};
+    if (S->out >= fl->n_stops || !is_coupled(fl, S->out)) return;
+    for (int s = 0; s < fl->n_stops; s++) {
+        S->closed[s] = false;
+        for (int i = 0; i < m; i++)
+            S->closed[s] = S->closed[s] || depths_of(fl, m, piece)[(size_t)s * m + i] != 0.0;
+    }
+    couple(fl, S->closed);
+    show_output(S, rows);
+    S->shift = fl->plain->stops[(size_t)S->out * fl->n_columns + GAP] - stop_of(fl, S->out)->gap;
+}
+
 /* go through the samples of piece n; `moved` is the fastest motion in contact */
 static void search_piece(Search *S, const Record *rec, int64_t n, double moved)
 {
     Piece *piece = &S->piece;
     const Gauss *tab = piece->tab;
     begin_piece(piece, rec, n);
+    couple_in_piece(S, recorded(rec, n));
     double seen = larger(S->fl.omega, leave_unseen(S));
     bool flight = piece->kind == FLIGHT;
     if (!flight) seen = larger(seen, moved);
@@ -307,6 +337,7 @@ static void lay_out_search(Block *block, const System *sys, const Gauss *tab, si
     S->terms = room(block, most_terms(sys) + more, sizeof(Term));
     for (int d = 0; d < 2; d++)
         S->moving[d].forced = room(block, 1 + most_terms(sys) + more, sizeof(Complex));
+    S->closed = flags(block, S->fl.n_stops);
     S->w = numbers(block, S->fl.size);
     S->v = numbers(block, S->fl.size);
     S->weights = numbers(block, (size_t)(KEPT_WEIGHTS + 1) * tab->m);
@@ -326,11 +357,9 @@ static void begin_output(Search *S, int out, int64_t more, const double *orders,
     int rows[2] = {out, S->round ? (int)S->round->second : out};
     S->n_terms = fl->n_terms + (int)more;
     for (int p = 0; p < fl->n_terms; p++) S->terms[p] = fl->terms[p];
-    for (int d = 0; d < 2; d++) {
-        S->moving[d].row = row_of(fl, 0, rows[d]);
-        S->moving[d].row1 = row_of(fl, 1, rows[d]);
-        for (int p = 0; p <= fl->n_terms; p++) S->moving[d].forced[p] = forced_of(fl, p, 0, rows[d]);
-    }
+    S->out = out;
+    S->shift = 0.0;
+    show_output(S, rows);
     for (int p = 0; p < more; p++) {
         S->moving[0].forced[1 + fl->n_terms + p] = amplitudes[p];
         S->moving[1].forced[1 + fl->n_terms + p] = (Complex){0.0, 0.0}; /* nothing rides there */

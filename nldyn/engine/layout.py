@@ -87,6 +87,10 @@ class SystemData(NamedTuple):
     laws: NDArray[np.int64]
     tail: float  # largest relative Legendre tail accepted on a contact panel
     node_angle: float  # phase of the fastest mode from node to node, in rad
+    common: Real  # (n_stops, n_stops) how far a unit force at one moves another at once
+
+
+SYSTEM_FIELDS = 5 + len(SystemData._fields)  # as the engine has them: with its five counts
 
 
 @dataclass(frozen=True, eq=False)

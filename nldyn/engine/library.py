@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cython_blas
 
-from nldyn.engine.layout import FIRST_POWER, UNDECIDED
+from nldyn.engine.layout import FIRST_POWER, SYSTEM_FIELDS, UNDECIDED
 from nldyn.engine.numbers import address_of
 
 FOLDER = Path(os.environ.get("NLDYN_ENGINE", Path(__file__).parent)).resolve()  # of sanitizers
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 REBUILT = "'pip install .' or '-e .' builds it"
 NOT_BUILT = f"the engine of nldyn is not built: {REBUILT}"
-LAYOUT = 100 * FIRST_POWER + UNDECIDED  # as `nldyn_layout` of the engine
+LAYOUT = 10000 * SYSTEM_FIELDS + 100 * FIRST_POWER + UNDECIDED  # as `nldyn_layout` of the engine
 
 
 def library_name(level: str = "") -> str:

@@ -88,12 +88,12 @@ class Found(NamedTuple):
 
 def packed_system(system: SystemData) -> Packed:
     """A system's numbers as the engine reads them."""
-    blocks, rows, bound3, force, orders, drive, stops, laws, tail, node_angle = system
+    blocks, rows, bound3, force, orders, drive, stops, laws, tail, node_angle, common = system
     return Packed(
         len(blocks), rows.shape[1], len(stops), stops.shape[1], orders.size,
         *(np.ascontiguousarray(array) for array in (
             blocks, rows, bound3, force, orders, drive.astype(complex), stops, laws)),
-        tail, node_angle,
+        tail, node_angle, np.ascontiguousarray(common),
     )  # fmt: skip
 
 

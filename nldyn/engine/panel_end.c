@@ -152,8 +152,13 @@ static void add_node_columns(const Flow *fl, double node_phase, double t, const 
             continue;
         }
         double speed = panel->outputs > na ? panel->output[(na + o) * m + i] : 0.0;
-        forces[fl->size + c] +=
-            share_in(fl, c, stop) * law_by(fl, stop, column, panel->output[o * m + i], speed);
+        double by = share_in(fl, c, stop) * law_by(fl, stop, column, panel->output[o * m + i], speed);
+        for (int a = 0; a < na; a++) {
+            double share = a == o;
+            if (is_coupled(fl, stop) && is_coupled(fl, panel->active[a]))
+                share = passed_on(fl, panel->active[a], stop);
+            s->forces[(size_t)(a * m + i) * n_columns + fl->size + c] += share * by;
+        }
     }
 }
 

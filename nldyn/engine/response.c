@@ -153,7 +153,7 @@ static void fill_response(const System *sys, const Complex *drive_by, double ome
 }
 
 /* fill the response of the outputs from that of the state */
-static void fill_forced(Flow *fl)
+static void fill_forced(const Flow *fl)
 {
     int rows = 2 + fl->n_parameters;
     for (int p = 0; p < (1 + fl->n_terms) * rows; p++)
@@ -166,6 +166,8 @@ static void fill_forced(Flow *fl)
         }
 }
 
+static void uncouple(const Flow *fl);
+
 /* numbers of the system at an excitation frequency (rad/s); the arrays of `fl` have their room */
 static void at_frequency(const System *sys, double omega, const Complex *drive_by, Flow *fl)
 {
@@ -175,7 +177,13 @@ static void at_frequency(const System *sys, double omega, const Complex *drive_b
     int rows = 2 + fl->n_parameters;
     memset(fl->response, 0, sizeof(Complex) * (1 + fl->n_terms) * rows * fl->size);
     fill_response(sys, drive_by, omega, rows, fl->response);
-    fill_forced(fl);
+    if (fl->give) {
+        fl->rows = fl->own_rows;
+        fl->stops = fl->own_stops;
+        uncouple(fl);
+    } else {
+        fill_forced(fl);
+    }
     for (int s = 0; s < fl->n_stops; s++)
         for (int k = 0; k < fl->size; k++)
             fl->pushes[(size_t)s * fl->size + k] = sys->force[(size_t)k * fl->n_stops + s];

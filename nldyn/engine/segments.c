@@ -34,6 +34,14 @@ static bool force_jumps(const Motion *M, int stop, double phase)
     return stop_of(M->fl, stop)->dashpot > 0.0;
 }
 
+/* let coupled stops know which are closed, and forget the penetrations that were carried */
+static void recouple(Motion *M)
+{
+    couple(M->fl, M->closed);
+    for (int s = 0; s < M->fl->n_stops; s++)
+        if (is_coupled(M->fl, s)) M->doubt[s] = INFINITY;
+}
+
 /* close a stop that is open, or open one that is closed, a time t after the start */
 static void switch_stop(Motion *M, int stop, double phase, double t)
 {
@@ -44,6 +52,7 @@ static void switch_stop(Motion *M, int stop, double phase, double t)
         M->closed[s] = M->closed[stop];
         M->fl->slides[s] = 0;
     }
+    if (is_coupled(M->fl, stop)) recouple(M);
     if (M->closed[stop]) {
         loosen_sliders(M, phase, SHUT);
         slip_overloaded(M, phase);
@@ -53,15 +62,19 @@ static void switch_stop(Motion *M, int stop, double phase, double t)
         jump_columns(M, stop, phase, t, M->closed[stop]);
 }
 
-/* open and close the stops that do so at the very instant of another one's event, each to the
- * small share of the length h of the panel before it to which it must be known */
-static void switch_with(Motion *M, double phase, double t, double h)
+/* Open and close the stops that do so at the very instant of another one's event, each to the
+ * small share of the length h of the panel before it to which it must be known. Of coupled ones
+ * always the first that is wrong: so it ends where all are right [Murty 1974]. What closes and opens
+ * again did not close; `was_open` tells of before. */
+static void switch_with(Motion *M, double phase, double t, double h, const bool *was_open)
 {
     const Flow *fl = M->fl;
+    int pivots = 0;
     for (int s = 0; s < fl->n_stops; s++)
         if (with_event(fl, s, M->w, phase, 10.0 * stop_of(fl, s)->instant * h, M->closed)) {
             switch_stop(M, s, phase, t);
-            if (M->closed[s]) M->closings[s]++;
+            M->closings[s] += M->closed[s] ? 1 : was_open[s] ? -1 : 0;
+            if (is_coupled(fl, s) && pivots++ < PIVOTS_PER_STOP * fl->n_stops) s = -1;
         }
 }
 
@@ -89,6 +102,7 @@ static void pass_event(Motion *M, int event, double h)
 {
     double here = M->phase + M->fl->omega * M->t;
     M->start_switch = 0;
+    for (int s = 0; s < M->fl->n_stops; s++) M->s->was_open[s] = !M->closed[s];
     if (rubs(M->fl, event)) {
         slide_or_stick(M, event, here, M->t);
     } else if (is_rigid(M->fl, event)) {
@@ -105,7 +119,7 @@ static void pass_event(Motion *M, int event, double h)
         M->start_switch = 1;
         if (M->closed[event]) M->closings[event]++;
     }
-    switch_with(M, here, M->t, h);
+    switch_with(M, here, M->t, h, M->s->was_open);
     if (M->undecided < 0) find_undecided(M);
     if (!any_sprung(M->fl)) return;
     contact_forces(M, here);
@@ -308,14 +322,39 @@ static int run_pieces(Motion *M)
     return TOO_MANY_PIECES;
 }
 
+/* whether a stop is closed at the start, by its penetration */
+static bool begins_shut(const Motion *M, int s)
+{
+    Course at = gap_now(M->fl, s, M->w, M->phase);
+    double left = at.first < 0.0 ? gap_noise(M->fl, s, M->w) : 0.0; /* it opens now */
+    return at.value > left;
+}
+
+/* which coupled stops are closed at the start, see `switch_with` */
+static void begin_coupled(Motion *M)
+{
+    const Flow *fl = M->fl;
+    if (!any_coupled(fl)) return;
+    uncouple(fl);
+    for (int s = 0; s < fl->n_stops; s++) M->closed[s] = is_coupled(fl, s) && begins_shut(M, s);
+    couple(fl, M->closed);
+    int pivots = 0;
+    for (int s = 0; s < fl->n_stops && pivots < PIVOTS_PER_STOP * fl->n_stops; s++) {
+        if (!is_coupled(fl, s) || M->closed[s] == begins_shut(M, s)) continue;
+        M->closed[s] = !M->closed[s];
+        couple(fl, M->closed);
+        pivots++;
+        s = -1;
+    }
+}
+
 /* which stops are closed at the start */
 static void begin_contacts(Motion *M)
 {
     const Flow *fl = M->fl;
+    begin_coupled(M);
     for (int s = 0; s < fl->n_stops; s++) {
-        Course at = gap_now(fl, s, M->w, M->phase);
-        double left = at.first < 0.0 ? gap_noise(fl, s, M->w) : 0.0; /* it opens now */
-        bool shut = at.value > left && is_elastic(fl, s);
+        bool shut = is_elastic(fl, s) && begins_shut(M, s);
         fl->slides[s] = 0;
         M->closed[s] = is_bond(fl, s) || shut;
         if (is_slider(fl, s))
@@ -323,8 +362,8 @@ static void begin_contacts(Motion *M)
         if (is_second(fl, s)) M->closed[s] = M->closed[(int)stop_of(fl, s)->lead];
         if (!(never_pulls(fl, s) && M->closed[s])) continue;
         int release = (int)stop_of(fl, s)->release;
-        at = output_now(fl, release, M->w, M->phase);
-        left = at.first < 0.0 ? output_noise(fl, release, M->w) : 0.0;
+        Course at = output_now(fl, release, M->w, M->phase);
+        double left = at.first < 0.0 ? output_noise(fl, release, M->w) : 0.0;
         M->closed[s] = at.value - stop_of(fl, s)->gap > left;
     }
     loosen_sliders(M, M->phase, AT_START);

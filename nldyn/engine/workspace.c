@@ -50,6 +50,17 @@ static void lay_out_flow(Block *block, const System *sys, int n_parameters,
     fl->terms = room(block, most_terms(sys), sizeof(Term));
     fl->response = room(block, amplitudes * fl->size, sizeof(Complex));
     fl->forced = room(block, amplitudes * fl->n_out, sizeof(Complex));
+    fl->give = NULL;
+    size_t pairs = (size_t)fl->n_stops * fl->n_stops, first = 0;
+    while (first < pairs && sys->common[first] == 0.0) first++;
+    if (first == pairs) return;
+    fl->plain = sys;
+    fl->own_rows = numbers(block, (size_t)3 * fl->n_out * fl->size);
+    fl->own_stops = numbers(block, (size_t)fl->n_stops * fl->n_columns);
+    fl->give = numbers(block, pairs);
+    fl->coupled = flags(block, fl->n_stops);
+    fl->counted = flags(block, fl->n_stops);
+    fl->pivots = indices(block, 1);
 }
 
 /* most derivatives that panels have outputs of, with the outputs themselves */
@@ -156,6 +167,7 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     s->offsets = numbers(block, na * (1 + n_columns));
     s->struck = flags(block, na);
     s->still = flags(block, na);
+    s->was_open = flags(block, na);
 }
 
 static void lay_out_motion(Block *block, const Flow *fl, Motion *M)

@@ -320,12 +320,17 @@ class FlowMap:
         observed = 0 <= place < len(s.interfaces)
         return s.ride(s.interfaces[place], omega) if observed else NO_RIDE
 
+    def _bends(self, output: int) -> bool:
+        """Whether an output is no linear function of the state: of a ring, or coupled stops."""
+        s = self.system
+        return output in s.round_stops or (output < len(s.stops) and s.coupled.involves(output))
+
     @cached_property
     def first_alike(self) -> list[int]:
         """For each output the first one of the same row: an interface may be where a stop is."""
         riding = len(self.rows) if self.system.rides else 0
         keys = [
-            (place if riding or place in self.system.round_stops else None, row.tobytes())
+            (place if riding or self._bends(place) else None, row.tobytes())
             for place, row in enumerate(self.rows)
         ]
         return [keys.index(key) for key in keys]
@@ -335,14 +340,18 @@ class FlowMap:
 
         Of a stop it is the penetration without its gap.
         """
-        stop = self.system.round_stops.get(output)
-        if stop is None:
+        if not self._bends(output):
             return np.asarray((states * self.rows[output]).sum(axis=1))
-        return self.system.round_polar(stop, self.to_modal(states)).depth + stop.gap
+        stop = self.system.stops[output]
+        return self.system.depth_and_speed(stop, self.to_modal(states))[0] + stop.gap
 
     def output_row(self, output: int, state: Real) -> Real:
         """Derivative (2n,) of an output by the state z (2n,)."""
         stop = self.system.round_stops.get(output)
+        if stop is None and self._bends(output):
+            rows = self.rows[: len(self._gaps)]
+            maps = self.system.coupled.maps((rows @ state - self._gaps)[None])
+            return np.asarray(maps[0, output] @ rows)
         if stop is None:
             return np.asarray(self.rows[output])
         normal = self.system.round_polar(stop, self.to_modal(state[None])).normal[0]
@@ -460,6 +469,7 @@ class FlowMap:
             np.array([law_address(e.law) for e in s.stops] + [0] * unlawful, dtype=np.int64),
             self._bounds.tail,
             self._bounds.node_angle,
+            np.pad(s.coupled.common, (0, len(stops) - len(s.stops))),
         )
 
     def _plane_stops(self, stops: list[StopRow]) -> list[StopRow]:

@@ -220,5 +220,4 @@ def _normal_force(flow: FlowMap, slider: Slider, states: Real) -> Real:
     if slider.stop < 0:
         return np.full(len(states), slider.normal_force)
     stop = flow.system.elastic_stops[slider.stop]
-    row, rate = flow.rows[slider.stop], flow.rate_rows[slider.stop]
-    return stop.force(states @ row - stop.gap, states @ rate)
+    return stop.force(*flow.system.depth_and_speed(stop, flow.to_modal(states)))

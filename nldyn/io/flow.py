@@ -249,6 +249,8 @@ def _write_interfaces(group: Any, system: System) -> None:
     set_attribute(group, "interfaces", system.interfaces)
     if system.rides:
         set_attribute(group, "rides", json.dumps({k: dict(v) for k, v in system.rides.items()}))
+    if system.common_flexibility is not None:
+        put(group, "common_flexibility", system.common_flexibility, "m/N")
     if system.rotations:
         set_attribute(group, "rotations", tuple(sorted(system.rotations)))
     vectors = np.array([system.participation[name] for name in system.interfaces], dtype=float)
@@ -425,6 +427,7 @@ def read_flow(group: Group, laws: Laws) -> FlowMap:
             _read_spin(group.group("spin"), n) if "spin" in group else None,
             _read_rides(group) if group.has_attribute("rides") else {},
             frozenset(group.texts("rotations") if group.has_attribute("rotations") else ()),
+            group.array("common_flexibility", -1, -1) if "common_flexibility" in group else None,
         )
     except SystemModelError as error:
         if str(error).startswith(str(group.path)):

@@ -680,12 +680,10 @@ def history_of(
     (k, n_stops) are the forces of rigid stops on what rests on them.
     """
     q = states[:, : system.size]
-    depth = np.empty((len(system.stops), time.size))
-    force = rest.T.copy()
-    for row, stop in enumerate(system.stops):
-        depth[row], speed = system.depth_and_speed(stop, states)
-        if row in system.elastic_stops:
-            force[row] = system.elastic_stops[row].force(depth[row], speed)
+    depth, speed = system.depths_and_speeds(states)
+    force = rest.copy()
+    for row, stop in system.elastic_stops.items():
+        force[:, row] = stop.force(depth[:, row], speed[:, row])
     return History(
         time,
         q,
@@ -694,8 +692,8 @@ def history_of(
             name: q @ phi + _carried(system, name, phases, omega)
             for name, phi in system.participation.items()
         },
-        depth.T,
-        force.T,
+        depth,
+        force,
         {name: system.unit(name) for name in system.interfaces},
         tuple(system.unit(stop.at) for stop in system.stops),
     )

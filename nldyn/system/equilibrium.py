@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -176,8 +177,8 @@ def _sum_of_forces(system: System, push: Real, q: Real) -> float:
 
 def _pushes(system: System, q: Real) -> Iterator[tuple[Real, float]]:
     """Vectors and forces of the closed stops and of the bonds."""
-    for _, stop, c, depth in _closed(system.elastic_stops, system, q):
-        yield c, _elastic(stop, depth)[0]
+    for each in _closed(system.elastic_stops, system, q):
+        yield each.vector, _elastic(each.stop, each.depth)[0]
     for bond in system.bonds:
         c = _vector(system, bond)
         yield c, float(bond.force(c @ q))
@@ -338,7 +339,7 @@ def closed_at_rest(system: System, q: Real) -> list[tuple[int, float, float]]:
     springs = with_springs_for_rigid_stops(system).elastic_stops
     return [
         (i, 0.0 if system.stops[i].impulsive else depth, float(stop.force(depth)))
-        for i, stop, _, depth in _closed(springs, system, q)
+        for i, stop, _, depth, *_ in _closed(springs, system, q)
     ]
 
 
@@ -368,9 +369,9 @@ def held_motion(system: System, q: Real, omega: float, phases: Real) -> Real:
 def tangent_stiffness(system: System, q: Real) -> Real:
     """Stiffness (n, n) of the structure with its closed stops at modal displacements q."""
     matrix = np.array(system.stiffness)
-    for _, stop, c, depth in _closed(system.elastic_stops, system, q):
+    for _, stop, c, depth, along, _ in _closed(system.elastic_stops, system, q):
         force, stiffness = _elastic(stop, depth)
-        matrix += stiffness * np.outer(c, c)
+        matrix += stiffness * np.outer(c, along)
         if isinstance(stop, RoundStop):
             at, rows = _at_round(system, stop, q)
             across = at.across[0] @ rows
@@ -386,10 +387,24 @@ def _vector(system: System, bond: Bond) -> Real:
     return system.vector_between(bond.at, bond.against)
 
 
-def _closed(
-    stops: Mapping[int, Stop | RoundStop], system: System, q: Real
-) -> Iterator[tuple[int, Stop | RoundStop, Real, float]]:
-    """Those of some stops that are closed at modal displacements q: vectors and penetrations."""
+class Closed(NamedTuple):
+    """A stop that is closed: its place, modal vector c, penetration, and what that goes with.
+
+    That is the derivative (n,) of the penetration by the modal displacements: with stops that move
+    each other at once not c alone. `free` is the penetration if no other one did.
+    """
+
+    place: int
+    stop: Stop | RoundStop
+    vector: Real
+    depth: float
+    along: Real
+    free: float
+
+
+def _closed(stops: Mapping[int, Stop | RoundStop], system: System, q: Real) -> Iterator[Closed]:
+    """Those of some stops that are closed at modal displacements q."""
+    alone = []
     for i, stop in stops.items():
         if isinstance(stop, RoundStop):
             at, rows = _at_round(system, stop, q)
@@ -397,8 +412,20 @@ def _closed(
         else:
             c = system.stop_vector(stop)
             depth = float(c @ q) - stop.gap
-        if depth > 0.0:
-            yield i, stop, c, depth
+        alone.append(Closed(i, stop, c, depth, c, depth))
+    if system.common_flexibility is not None:
+        depths = np.full(len(system.stops), -1.0)
+        vectors = np.zeros((len(system.stops), system.size))
+        for each in alone:
+            depths[each.place], vectors[each.place] = each.free, each.vector
+        (together,) = system.coupled.maps(depths[None])
+        alone = [
+            each._replace(
+                depth=float(together[each.place] @ depths), along=together[each.place] @ vectors
+            )
+            for each in alone
+        ]
+    yield from (each for each in alone if each.depth > 0.0)
 
 
 def _at_round(system: System, stop: RoundStop, q: Real) -> tuple[Polar, Real]:
@@ -412,7 +439,7 @@ def _rubbed(system: System, q: Real) -> tuple[Real, Real]:
     What does not turn may rest with any friction up to μN: it is taken to rest without.
     """
     force, slope = np.zeros(system.size), np.zeros((system.size, system.size))
-    for _, stop, c, depth in _closed(system.elastic_stops, system, q):
+    for _, stop, c, depth, *_ in _closed(system.elastic_stops, system, q):
         if not isinstance(stop, RoundStop) or not stop.friction or not stop.surface_speed:
             continue
         at, rows = _at_round(system, stop, q)
@@ -486,8 +513,9 @@ def force_at(system: System, push: Real, q: Real) -> Real:
 def potential_at(system: System, push: Real, q: Real) -> float:
     """Energy in J of all springs and closed stops at q, less that of a constant force."""
     energy = 0.5 * float(q @ system.stiffness @ q) - float(push @ q)
-    for _, stop, _, depth in _closed(system.elastic_stops, system, q):
-        energy += _elastic(stop, depth)[0] * depth / (stop.exponent + 1.0)
+    for each in _closed(system.elastic_stops, system, q):  # what gives way at once stores, too
+        force = _elastic(each.stop, each.depth)[0]
+        energy += force * each.free / (each.stop.exponent + 1.0)
     for bond in system.bonds:
         energy += float(bond.energy(_vector(system, bond) @ q))
     return energy

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from nldyn.base.arrays import Real
+from nldyn.base.arrays import TINY, Real
 from nldyn.base.errors import SystemModelError
 from nldyn.system.friction import DryFriction
 from nldyn.system.rigid_stop import AnyStop, RigidStop
@@ -17,7 +17,8 @@ from nldyn.system.round_stop import RoundStop
 from nldyn.system.stop import Stop
 
 NEGATIVE = 1e-9  # of the largest eigenvalue of a flexibility: one that is not rounding
-MOST_COMMON = 0.05  # share of their massless flexibility that two contacts may have in common
+WORST_CONDITION = 1e7  # of flexibilities between contacts: eight digits of forces are left
+MOST_COMMON = 0.05  # share of massless flexibility that friction and others may have in common
 
 Ends = tuple[str | None, str | None]
 
@@ -70,6 +71,52 @@ class MasslessBoundary:
             if end is not None and end in self.names:
                 vector[self.names.index(end)] += sign
         return vector
+
+    def common(self, stops: Sequence[AnyStop]) -> Real | None:
+        """How far a unit force at each stop lets each other one move at once, (n, n), or None.
+
+        The two sides of one gap, which are never closed at once, need not know of each other.
+
+        Raises
+        ------
+        SystemModelError
+            If stops have all but all of it in common, so that nothing tells their forces.
+        """
+        rows = [
+            getattr(stop, "direction", 0) * self._signed((stop.at, stop.against)) for stop in stops
+        ]
+        whole = np.array(rows).reshape(len(stops), len(self.names))
+        found = whole @ self.flexibility @ whole.T
+        own = np.sqrt(np.diag(found))
+        found[np.abs(found) <= NEGATIVE * np.outer(own, own)] = 0.0
+        one_side = list(range(len(stops)))
+        for i, j in itertools.combinations(range(len(stops)), 2):
+            if found[i, j] != 0.0 and facing(stops[i], stops[j]):
+                found[i, j] = found[j, i] = 0.0
+                one_side = [place for place in one_side if place != j]
+        moved = [i for i in one_side if own[i] > 0.0]
+        if moved:
+            self._check_condition([stops[i] for i in moved], found[np.ix_(moved, moved)])
+        np.fill_diagonal(found, 0.0)
+        return found if np.any(found) else None
+
+    @staticmethod
+    def _check_condition(stops: Sequence[AnyStop], give: Real) -> None:
+        """Refuse stops whose forces nothing tells apart, by the flexibility between them (n, n)."""
+        springs = [1.0 / s.stiffness if isinstance(s, Stop) else 0.0 for s in stops]
+        own = np.sqrt(np.diag(give))
+        values, ways = np.linalg.eigh((give + np.diag(springs)) / np.outer(own, own))
+        if values[0] * WORST_CONDITION >= values[-1]:
+            return
+        first, second = np.sort(np.argsort(np.abs(ways[:, 0]))[-2:]).tolist()
+        condition = values[-1] / max(values[0], TINY)
+        raise SystemModelError(
+            f"contacts without mass have flexibilities of a condition number of {condition:.1e}, "
+            f"more than {WORST_CONDITION:.0e}, so that nothing tells their forces apart, as at "
+            f"{told((stops[first].at, stops[first].against))} and "
+            f"{told((stops[second].at, stops[second].against))}: place them farther apart, keep "
+            "fewer modes, or give them a stiffness"
+        )
 
     def acting(self, elements: Mapping[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
         """Elements of a system with what is in series with its massless boundary.
@@ -170,8 +217,9 @@ class MasslessBoundary:
             for i, stop in enumerate(stops)
             if plain(stop) and stop.tangent is not None
         ]
-        dry = [(-1, (damper.at, damper.against)) for damper in sliding]
-        for (i, ends), (j, others) in itertools.combinations([*normal, *along, *dry], 2):
+        along += [(-1, (damper.at, damper.against)) for damper in sliding]
+        pairs = [*itertools.product(along, normal), *itertools.combinations(along, 2)]
+        for (i, ends), (j, others) in pairs:
             both = np.sqrt(self.between(ends, ends) * self.between(others, others))
             common = abs(self.between(ends, others))
             if common <= MOST_COMMON * both or (min(i, j) >= 0 and facing(stops[i], stops[j])):

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from nldyn.base.arrays import TINY, Complex, Real
 from nldyn.base.errors import SystemModelError, is_finite, must_be_symmetric, numbers, shown
+from nldyn.system.coupled_stops import CoupledStops
 from nldyn.system.friction import DryFriction, Friction, Slider
 from nldyn.system.linear import (
     ForcedResponse,
@@ -116,6 +117,9 @@ class System:
     rotations : set of str
         Interfaces that turn: their displacement is an angle in rad, and what acts there a moment.
         Nothing is computed otherwise for it; tables and pictures have their units from it.
+    common_flexibility : (k, k) array, optional
+        How far a unit force at each of the k stops lets each other one move at once, in m/N, with
+        zeros on the diagonal: stops without mass that give way together, see `CoupledStops`.
 
     Raises
     ------
@@ -144,6 +148,7 @@ class System:
     spin: Spin | None = None
     rides: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     rotations: frozenset[str] = frozenset()
+    common_flexibility: Real | None = None
 
     def __repr__(self) -> str:
         """One line: modes, interfaces, and what acts."""
@@ -331,15 +336,16 @@ class System:
         ------
         SystemModelError
             If it is no reduced model; if what acts on interfaces without mass is neither a rigid
-            or linear stop nor dry friction, or such contacts have more than 5 % of the flexibility
-            without mass in common; or if modes are left out that a skew matrix may couple. See
-            also `System`.
+            or linear stop nor dry friction; if nothing tells the forces of such stops apart, or
+            friction has more than 5 % of the flexibility without mass in common with others; or if
+            modes are left out that a skew matrix may couple. See also `System`.
 
         Notes
         -----
         Interfaces whose flexibility has no mass (`residual_flexibility`), as by
         ``cms.reduce(..., method="macneal", massless=[...])``, follow the forces there at once. A
-        `RigidStop` at one is the linear `Stop` of that flexibility, friction at it has the spring
+        `RigidStop` at one is the linear `Stop` of that flexibility (several, with what they have in
+        common, are `CoupledStops`), friction at it has the spring
         of that of its tangent, and the displacement there is that of the modes, without what gives
         way: see docs/how-to/massless_boundary.md.
         """
@@ -350,8 +356,12 @@ class System:
             )
         massless = getattr(reduced, "residual_flexibility", None)
         elements = _listed(acting)
+        common = None
         if massless is not None and np.any(massless):
-            elements = MasslessBoundary(tuple(reduced.participation), massless).acting(elements)
+            boundary = MasslessBoundary(tuple(reduced.participation), massless)
+            stops = elements.get("stops", ())
+            elements = boundary.acting(elements)
+            common = boundary.common(stops)
         given = (gyroscopic, circulatory, spin)
         if getattr(reduced, "left_out_hz", ()) and any(one is not None for one in given):
             raise SystemModelError(
@@ -382,6 +392,7 @@ class System:
             circulatory=(
                 None if circulatory is None else skew("circulatory", circulatory, system.size)
             ),
+            common_flexibility=common,
             **elements,
         )._spun(None if spin is None else _of_size(spin, system.size))
 
@@ -631,6 +642,14 @@ class System:
         return {i: stop for i, stop in enumerate(self.stops) if isinstance(stop, RigidStop)}
 
     @cached_property
+    def coupled(self) -> CoupledStops:
+        """The stops as those that move each other at once; mostly none does."""
+        count = len(self.stops)
+        stiffness = np.array([getattr(stop, "stiffness", math.inf) for stop in self.stops])
+        common = self.common_flexibility
+        return CoupledStops(np.zeros((count, count)) if common is None else common, stiffness)
+
+    @cached_property
     def linear(self) -> LinearPart:
         """Independent pairs of coordinates of the linear part."""
         omega, modes, D = self.natural_frequencies, None, self.total_damping
@@ -679,6 +698,25 @@ class System:
 
     def depth_and_speed(self, stop: AnyStop, states: Real) -> tuple[Real, Real]:
         """Penetration of a stop (negative when open) and its rate at modal states (k, 2n)."""
+        number = self.stops.index(stop) if self.common_flexibility is not None else -1
+        if number >= 0 and self.coupled.involves(number):
+            depths, speeds = self.depths_and_speeds(states)
+            return depths[:, number], speeds[:, number]
+        return self._alone(stop, states)
+
+    def depths_and_speeds(self, states: Real) -> tuple[Real, Real]:
+        """Penetrations (k, n) of all stops and their rates, as `depth_and_speed`."""
+        each = [self._alone(stop, states) for stop in self.stops]
+        if not each:
+            return np.empty((len(states), 0)), np.empty((len(states), 0))
+        depths, speeds = (np.column_stack(values) for values in zip(*each, strict=True))
+        if self.common_flexibility is None:
+            return depths, speeds
+        maps = self.coupled.maps(depths)
+        return tuple(np.einsum("kij,kj->ki", maps, values) for values in (depths, speeds))
+
+    def _alone(self, stop: AnyStop, states: Real) -> tuple[Real, Real]:
+        """Penetration of a stop that no other one moves at once, and its rate."""
         if isinstance(stop, RoundStop):
             at = self.round_polar(stop, states)
             return at.depth, at.rate
@@ -965,6 +1003,12 @@ class System:
         for what, vectors in (("participation of", self.participation), ("load", self.loads)):
             for name, phi in vectors.items():
                 _check_modal_vector(f"{what} '{name}'", phi, n)
+        common, count = self.common_flexibility, len(self.stops)
+        if common is not None and (common.shape != (count, count) or np.any(np.diag(common))):
+            raise SystemModelError(
+                f"common_flexibility must be ({count}, {count}) for {count} stops, with zeros on "
+                f"its diagonal, got {common.shape}"
+            )
         both = set(self.participation) & set(self.loads)
         if both:
             raise SystemModelError(f"'{min(both)}' names both an interface and a load vector")
