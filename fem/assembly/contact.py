@@ -14,7 +14,7 @@ from fem.base.arrays import FloatArray, IntArray
 from fem.base.errors import ModelError
 from fem.elements.beams import cross_matrix
 from fem.elements.scatter import SparseArray
-from fem.mesh.cells import KINDS
+from fem.mesh.cells import KINDS, TRIANGLE
 from fem.model.structure import AXES
 
 FLAT = 1e-4  # 1 - cosine of the angle between the normals of what counts as flat
@@ -317,7 +317,19 @@ def beam_block(
 
 
 def rule(kind: str, points: int) -> tuple[FloatArray, FloatArray]:
-    """Places (q, d) and positive weights (q,) on a facet, so many in each direction."""
+    """Places (q, d) and positive weights (q,) on a facet, so many in each direction.
+
+    On a triangle those of as high an order.
+    """
+    shape = KINDS[kind].shape
+    if shape is not TRIANGLE:
+        s, w = gauss(points)
+        count = shape.corners.shape[1]
+        places = np.stack(np.meshgrid(*[s] * count, indexing="ij"), axis=-1).reshape(-1, count)
+        weights = np.stack(np.meshgrid(*[w] * count, indexing="ij"), axis=-1).reshape(-1, count)
+        return places, weights.prod(axis=1)
+    if points == 1:
+        return shape.corners.mean(axis=0)[None], np.array([0.5])
     for order in range(2 * points - 1, 2 * points + 4):
         places, weights = KINDS[kind].rule(order)
         if np.all(weights > 0.0):

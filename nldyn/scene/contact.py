@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -73,13 +74,23 @@ class _End:
         """Of the interfaces of the points."""
         return [f"{self.name} {i + 1}{word}" for i in range(len(self.points.places))]
 
-    def vectors(self, table: MeshAreaTable) -> dict[str, Real]:
-        """Load vectors of the interfaces, along the normal and the surface."""
+    def touching(self, body: fem.Component, table: MeshAreaTable) -> fem.Component:
+        """The component with interfaces at the points, along the normal and the surface.
+
+        Along a surface that gives way they share attachment modes with those along the normal.
+        """
         named = dict(zip(self.names(), self.points.vectors(), strict=True))
+        stiffness = [table.stiffness * self.points.weights]
+        shared = list(named)
         for word, axis in _tangents(table):
             rows = self.points.vectors(_axis(axis))
             named |= zip(self.names(word), rows, strict=True)
-        return named
+            if table.tangential_stiffness is not None:
+                shared += self.names(word)
+                stiffness.append(table.tangential_stiffness * self.points.weights)
+        modes, tolerance = table.attachment_modes, table.static_error
+        area = cms.Area(shared, np.concatenate(stiffness), modes, tolerance)
+        return body.with_interfaces(named, {self.name: area})
 
     def of_whole(self, name: str) -> str:
         """What the model of all components calls an interface or an area."""
@@ -128,7 +139,7 @@ def _as_gaps(gap: float | list[float]) -> Real | float:
 def _placed(scene: Scene, parts: dict[str, Component], table: MeshAreaTable) -> Found:
     """The points of an area of a mesh, with whose interfaces the components are replaced."""
     part, at = _part_and_set(scene, table.at)
-    _check_plane(table)
+    _check_tangents(table)
     points = fem.contact_points(
         _meshed(parts, part), at, _axis(table.direction), points=table.points,
         surface=table.surface,
@@ -142,15 +153,12 @@ def _placed(scene: Scene, parts: dict[str, Component], table: MeshAreaTable) -> 
         ends = [_End(part, pair.near, table.name or at)]
         ends.append(_End(other, pair.far, f"{table.name or at} against"))
     points = ends[0].points
-    stiffness = table.stiffness * points.weights
-    for end in ends:
-        area = cms.Area(end.names(), stiffness, table.attachment_modes, table.static_error)
-        touching = _meshed(parts, end.part).with_interfaces(end.vectors(table), {end.name: area})
-        parts[end.part] = touching
+    words = ["", *(word for word, _ in _tangents(table))]
     sides: list[list[str] | None] = [None] * 6
     for number, end in enumerate(ends):
-        for first, word in enumerate(("", *(word for word, _ in _tangents(table)))):
-            sides[number + 2 * first] = [end.of_whole(name) for name in end.names(word)]
+        parts[end.part] = end.touching(_meshed(parts, end.part), table)
+        for place, word in enumerate(words):
+            sides[number + 2 * place] = [end.of_whole(name) for name in end.names(word)]
     return Found(
         sides,
         points.weights,
@@ -163,15 +171,17 @@ def _placed(scene: Scene, parts: dict[str, Component], table: MeshAreaTable) -> 
     )
 
 
-def _check_plane(table: MeshAreaTable) -> None:
-    """Refuse a second tangent that is not perpendicular to the first one and the normal."""
-    if table.second_along is None or table.along is None:
-        return
-    axes = (table.second_along, table.along, table.direction)
-    second, *others = (fem.unit_vector(table.called, _axis(axis)) for axis in axes)
-    for key, other in zip(("along", "direction"), others, strict=True):
-        if abs(second @ other) > SKEW:
-            raise SystemModelError(f"'second_along' must be perpendicular to '{key}'")
+def _check_tangents(table: MeshAreaTable) -> None:
+    """Refuse tangents that are not perpendicular to the normal and to each other."""
+    given = {key: getattr(table, key) for key in ("direction", "along", "second_along")}
+    axes = {
+        key: fem.unit_vector(table.called, _axis(axis))
+        for key, axis in given.items()
+        if axis is not None
+    }
+    for other, key in itertools.combinations(axes, 2):
+        if abs(axes[key] @ axes[other]) > SKEW:
+            raise SystemModelError(f"'{key}' must be perpendicular to '{other}'")
 
 
 def _tangents(table: MeshAreaTable) -> list[tuple[str, str | list[float]]]:

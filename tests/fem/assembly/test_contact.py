@@ -72,6 +72,15 @@ def test_beams_of_a_structure_are_those_of_a_frame():
         assert np.allclose(found.vectors(along) @ u, frame.vectors(along) @ v, rtol=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["hexahedron", "hexahedron20", "hexahedron27"])
+@pytest.mark.parametrize("points", [1, 2, 5])
+def test_a_facet_of_four_sides_has_as_many_points_as_asked_for_in_each_direction(kind, points):
+    found = fem.contact_points(block(kind), "z1", "z", points=points)
+    assert len(found.places) == 6 * points**2
+    if points == 1:
+        assert np.allclose(found.places[:, :2] % [0.5, 0.2], [0.25, 0.1])  # middles
+
+
 @pytest.mark.parametrize("kind", ["hexahedron", "hexahedron20", "tetra10", "wedge15"])
 @pytest.mark.parametrize("points", [1, 2])
 def test_points_of_a_face_move_as_it_does_and_weigh_what_it_measures(kind, points):

@@ -161,7 +161,7 @@ def test_what_does_not_face_the_area_is_refused_in_a_sentence():
     for component, points, at, more, said in (
         (high, down, "z0", {}, "faces away"),
         (high, up, "z1", {}, "faces away"),
-        (high, up, "x0", {}, "nothing of that lies opposite to any of its 16 points"),
+        (high, up, "x0", {}, "nothing of that lies opposite to any of its 4 points"),
         (far, up, "z0", {}, "nothing of that lies opposite"),
         (high, up, "lid", {}, "lid"),
         (high, up, "z0", {"surface": 0.1}, "surface is for beams and shells"),
