@@ -18,6 +18,7 @@ from nldyn.bifurcations.beyond_rigid_grazing import DIFFERENCED, SLIGHTEST
 from nldyn.bifurcations.branch_crossing import SHORTEST_CROSSING
 from nldyn.bifurcations.codimension_two import is_torus, is_torus_curve
 from nldyn.bifurcations.corners import CORNER_STEP, MEETS, corner_ahead, extremes_meet
+from nldyn.bifurcations.just_sticking import just_sticks
 from nldyn.bifurcations.on_curve import FARTHEST_NODE, on_chart_plane, on_plane
 from nldyn.bifurcations.period_doubling import flip_between, passed_flip
 from nldyn.bifurcations.point import BranchNode, place_of
@@ -237,6 +238,9 @@ class Stepper:
             if share > LOST_IN_ROUNDING:
                 place = place_of(here)
                 return Ending.LOST_IN_ROUNDING.told(place=place, share=f"{share:.1g}")
+            slider = just_sticks(here.orbit)
+            if slider is not None:
+                return Ending.JUST_STICKS.told(at=slider.at, place=place_of(here, 9))
         return Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
 
     def begin_anew(self, here: BranchNode, step: float) -> None:

@@ -53,6 +53,10 @@ class Ending(Enum):
         "one more impact grazes at each of ever closer {what}: near {place} they become a "
         "series without end, behind which the motion comes to rest"
     )
+    JUST_STICKS = (
+        "what slides at '{at}' just comes to rest at {place}: friction drops at once, so that "
+        "motions beyond it are not alike"
+    )
     FAILS = "what lies beyond {place} could not be computed: {obstacle}"
     MOST_POINTS = "{points} points"
     SHORT_STEP = "step below {step}: {obstacle}"

@@ -18,6 +18,7 @@ from nldyn import (
     continue_branch,
     solve_orbit,
 )
+from nldyn.branches.endings import Ending
 from nldyn.flow.sliding import slider_measures
 from nldyn.system import DryFriction, Friction
 
@@ -105,6 +106,21 @@ def test_more_friction_at_rest_takes_the_stability_of_two_stops():
     assert not last.stable
     assert last.max_abs_displacement == pytest.approx(known.top, rel=1e-8)
     assert np.abs(last.multipliers).max() == pytest.approx(known.slope**2, rel=1e-6)
+
+
+def test_motions_with_one_stop_a_cycle_end_where_that_takes_no_time():
+    """Of unequal halves; with none at the upper end, and one more at the lower one."""
+    branch = continue_branch(solve_orbit(block(0.4, 0.8), 0.62 / TURN), (0.5 / TURN, 0.75 / TURN))
+    assert {reason.ending for reason in branch.stop_reasons} == {Ending.JUST_STICKS}
+    last = max(branch.points, key=lambda orbit: orbit.omega)
+
+    def missing(ratio):
+        """Friction at rest beyond the force with which motion without stops turns."""
+        size, swing = response(ratio)
+        return 0.8 - ratio**2 * math.sqrt(size**2 - (0.4 * swing) ** 2)
+
+    assert last.omega == pytest.approx(brentq(missing, 0.62, 0.75, xtol=1e-14), rel=1e-8)
+    assert last.friction[0].stuck < 1e-6
 
 
 @pytest.mark.parametrize(("ratio", "larger"), [(0.6, 1.2), (0.7, 1.2), (0.7, 2.0)])

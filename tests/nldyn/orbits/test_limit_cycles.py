@@ -18,6 +18,7 @@ from nldyn import (
     save,
     solve_orbit,
 )
+from nldyn.branches.endings import Ending, has_ending
 from nldyn.io import CheckpointFile
 from nldyn.system import CubicDamper, DryFriction, Friction
 
@@ -52,6 +53,31 @@ def test_stick_slip_with_a_drop_at_once_has_its_closed_form(speed):
     begins = found.duration - math.acos(drop / math.hypot(drop, speed / rate)) / rate
     slipping = found.history_at(np.array([found.omega * begins]))
     assert slipping.displacement["block"][0] == pytest.approx(0.5 * force / stiffness, rel=1e-8)
+
+
+def test_stick_slip_with_a_drop_at_once_ends_where_the_block_just_gets_as_fast_as_the_belt():
+    damping, drop = 0.04, 0.1
+    rate = math.sqrt(1.0 - 0.25 * damping**2)
+
+    def missing(belt):
+        """By how much the fastest speed, a swing after it slips, is more than the belt's."""
+        place = drop - damping * belt
+        other = (belt + 0.5 * damping * place) / rate
+
+        def moved(t):
+            faded, c, s = math.exp(-0.5 * damping * t), math.cos(rate * t), math.sin(rate * t)
+            speed = rate * (other * c - place * s) - 0.5 * damping * (place * c + other * s)
+            return faded * (place * c + other * s), faded * speed
+
+        top = brentq(lambda t: moved(t)[0] + damping * moved(t)[1], 4.0, 7.0, xtol=1e-14)
+        return moved(top)[1] - belt
+
+    start = limit_cycle(on_belt(0.15, law=(0.3, 0.4, None), damping=damping), [0.0, 0.15])
+    branch = continue_branch(start, (0.1, 0.3), parameter="base_speed")
+    last = branch.points[np.argmax(branch.values)]
+    assert has_ending(branch.stop_reasons, Ending.JUST_STICKS)
+    assert branch.values.max() == pytest.approx(brentq(missing, 0.15, 0.25), rel=1e-5)
+    assert last.friction[0].stuck > 0.05  # it would stick for so long
 
 
 STRIBECK = Friction(0.3, 0.4, 0.05)
