@@ -12,6 +12,7 @@ from nldyn.branches.endings import Ending, StopReason
 GAPS = {
     "period": "2",
     "place": "8.71 Hz",
+    "at": "block",
     "what": "frequencies",
     "points": "100",
     "step": "1e-05",
