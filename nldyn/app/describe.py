@@ -211,7 +211,10 @@ def _describe_round(stop: RoundStop) -> str:
     unit = "N/m" + ("" if stop.exponent == 1.0 else f"^{stop.exponent:g}")
     told = f"{'ring around' if stop.inside else 'pin beside'} {quoted(stop.plane)}"
     told += f" against {quoted(stop.against_plane)}" if stop.against_plane else ""
-    told += f": {stop.stiffness:.6g} {unit}, clearance {stop.clearance:g} m"
+    law = f"{stop.stiffness:.6g} {unit}"
+    if stop.restitution is not None:
+        told, law = f"rigid {told}", f"restitution {stop.restitution:g}"
+    told += f": {law}, clearance {stop.clearance:g} m"
     x, y = stop.eccentricity
     told += "" if stop.concentric else f", centre at {x:g}, {y:g} m"
     told += f", dissipation {stop.dissipation:g} s/m" if stop.dissipation else ""

@@ -85,6 +85,8 @@ class Touches:
         """
         if grazing is None:
             grazing = Grazing.of(orbit).with_others(orbit).grazing_too(orbit)
+        if any(each.stop in orbit.system.round_stops for each in grazing.passages):
+            raise ConvergenceError("beside the grazing of a rigid ring or pin nothing is followed")
         base, full = orbit.problem, 2.0 * math.pi * orbit.period
         found = sorted(
             ((each.phase + turn * each.every - base.start) % full + base.start, each.stop)

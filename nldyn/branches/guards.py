@@ -339,8 +339,8 @@ def rubs_all_around(orbit: Orbit) -> bool:
     """
     if orbit.impacts or not orbit.system.round_stops:
         return False
-    depth = orbit.trajectory.contacts_at_nodes[0]
-    return bool(depth[:, list(orbit.system.round_stops)].any())
+    force = orbit.trajectory.contacts_at_nodes[1]
+    return bool(force[:, list(orbit.system.round_stops)].any())
 
 
 def mends_symmetry(family: OrbitFamily, before: float, after: float) -> bool:

@@ -11,6 +11,7 @@
 #define FARTHER 10.0 /* and the next panel is so many times longer */
 #define WITHIN 1e-6 /* of a panel: a doubtful place nearer to an end is that of a known switch */
 #define MOST_ATTEMPTS 100
+#define ELSEWHERE 1e-4 /* of its radius: a node off a circle that holds a body */
 
 /* a panel that is being looked for */
 typedef struct {
@@ -25,12 +26,30 @@ typedef struct {
 /* what comes of one attempt */
 enum Verdict { AGAIN, TAKEN, TAKEN_WITH_EVENT };
 
+/* whether a body on a rigid round clearance is elsewhere at a node of the panel: what holds it goes
+ * with the square of its speed, so that a body that is thrown around solves the equations, too */
+static bool leaves_circle(const Flow *fl, const Panel *panel)
+{
+    int m = panel->m;
+    for (int a = 0; a < panel->na; a++) {
+        int s = panel->active[a];
+        if (!is_round(fl, s) || !is_rigid(fl, s)) continue;
+        const double *x = panel->output + (size_t)a * m;
+        const double *y = panel->output + (size_t)partner_of(fl, panel, a) * m;
+        double radius = stop_of(fl, s)->gap;
+        for (int i = 0; i < m; i++)
+            if (!(fabs(hypot(x[i], y[i]) - radius) <= ELSEWHERE * radius)) return true;
+    }
+    return false;
+}
+
 /* Whether a panel holds another solution of the force laws than the motion: it opens a stop at
- * once that is not about to, or lets one feed as much as it should damp. */
+ * once that is not about to, lets one feed as much as it should damp, or leaves a rigid circle. */
 static bool far_off(const Motion *M, const Trial *trial, Event event)
 {
     const Flow *fl = M->fl;
     const Panel *panel = M->panel;
+    if (panel->round && leaves_circle(fl, panel)) return true;
     if (event.stop < 0) {
         double least = panel->decay[0];
         for (int a = 1; a < panel->na; a++) least = smaller(least, panel->decay[a]);
@@ -134,7 +153,7 @@ static int reach_aim(Motion *M, Trial *trial, bool event, bool fine)
         there = fabs(dh) <= RELEASED * h || fabs(off) <= noise ||
                 (is_sprung(fl, aim) && fabs(dh) <= SUM_ROUNDING * end_phase / fl->omega);
     } else if (ends_smoothly(fl, aim, M->closed)) {
-        dh = time_to_release(M->tab, aim, trial->kind, h, M->panel);
+        dh = time_to_release(fl, M->tab, aim, trial->kind, h, M->panel);
         there = fabs(dh) <= RELEASED * h;
     }
     if (fabs(dh) <= instant_with(fl, aim, w, end_phase, h, M->closed) ||

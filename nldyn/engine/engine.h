@@ -257,11 +257,11 @@ typedef struct {
     double *last_forces; /* (n_stops, 1 + n_columns) see `fill_last_force` */
     double *pushed, *carried, *added, *driven_many, *flown, *pushing, *showing; /* many stops */
     double *stop_forces, *pushes, *first_pushes, *held, *mobility; /* rigid stops */
-    double *across; /* (n_stops,) see `fill_across` */
+    double *across, *outward; /* (n_stops,) see `fill_directions` */
     double *drags; /* (n_stops,) speeds of the places of sliders behind springs, see `drag_speed` */
     int *resting, *mobility_order;
     double *rate, *moved, *moved_shift, *along, *along_columns, *offsets;
-    double *closing, *sliding, *pull; /* strike, hold */
+    double *closing, *sliding, *turning, *gained, *rubbed, *pull; /* strike, hold */
     bool *struck, *still;
     bool *was_open; /* (n_stops,) before an event */
 } Scratch;

@@ -55,13 +55,20 @@ static double pressing_noise(const Flow *fl, int stop, const double *w)
     return PRESSING_ROUNDING * output_size(fl, stop, w, 2);
 }
 
+/* what changes its sign with the force of a rigid stop at a place among the closed ones, (m,) */
+static const double *pressing_of(const Flow *fl, const Panel *panel, int a)
+{
+    bool around = is_round(fl, panel->active[a]);
+    return (around ? panel->radial : panel->output) + (size_t)a * panel->m;
+}
+
 /* time from the end of a panel to where a rigid stop's force changes its sign, or inf; the panel
  * must not be stretched at its end */
-static double time_to_release(const Gauss *tab, int stop, int kind, double h, const Panel *panel)
+static double time_to_release(const Flow *fl, const Gauss *tab, int stop, int kind, double h, const Panel *panel)
 {
     for (int a = 0; a < panel->na; a++) {
         if (panel->active[a] != stop) continue;
-        const double *output = panel->output + (size_t)a * panel->m;
+        const double *output = pressing_of(fl, panel, a);
         double slope = slope_at_end(tab, output) / (h * (kind == 0 ? 1.0 : 2.0));
         if (slope < 0.0) return -at_end(tab, output) / slope;
     }
@@ -365,18 +372,19 @@ static Shown show_stop(const Motion *M, int kind, double phase, double h, int st
     double start = first.value, end = round ? gap_now(fl, stop, M->w_end, end_phase).value
                                             : output_now(fl, out, M->w_end, end_phase).value;
     Shown shown = {gap_noise(fl, out, M->w), 0.0, sign * first.first};
-    if (round) {
+    if (is_rigid(fl, stop) && M->closed[stop]) {
+        const double *pressing = pressing_of(fl, panel, position);
+        shown.noise = round ? hold_noise(fl, (int)stop_of(fl, stop)->second, M->w)
+                            : pressing_noise(fl, stop, M->w);
+        shown.speed = 0.0;
+        start = at_start(tab, pressing) + gap;
+        end = at_end(tab, pressing) + gap;
+        memcpy(s->inner, pressing, sizeof(double) * m);
+    } else if (round) {
         show_round(M, kind, phase, h, stop, position, s->inner);
         for (int i = 0; i < m; i++) s->inner[i] *= sign;
     } else if (M->closed[stop]) {
         show_closed(fl, panel, position, stop, out, s->inner);
-        if (is_rigid(fl, stop)) {
-            const double *output = panel->output + (size_t)position * m;
-            shown.noise = pressing_noise(fl, stop, M->w);
-            shown.speed = 0.0;
-            start = at_start(tab, output) + gap;
-            end = at_end(tab, output) + gap;
-        }
     } else {
         node_outputs(fl, tab, kind, phase, h, panel, out, s->inner, s);
         for (int i = 0; i < m; i++) s->inner[i] = gap - s->inner[i];
@@ -473,7 +481,7 @@ static Event first_event(const Motion *M, int kind, double phase, double h)
         if (is_bond(fl, stop) || is_mover(fl, stop) || is_mate(fl, stop)) continue;
         if (is_second(fl, stop) && !rubs_around(fl, stop)) continue;
         if (rubs(fl, stop) && (!M->closed[stop] || slides_freely(fl, stop))) continue;
-        if (is_rigid(fl, stop) && !M->closed[stop] && held_open(M, stop)) continue;
+        if (is_rigid(fl, stop) && !is_round(fl, stop) && !M->closed[stop] && held_open(M, stop)) continue;
         if (!rubs(fl, stop)) {
             int out = watched(fl, stop, M->closed, M->w, phase);
             Shown shown = show_stop(M, kind, phase, h, stop, out, position);

@@ -86,7 +86,7 @@ static void keep_profile(const Flow *fl, const Gauss *tab, int kind, int new_kin
         stretch_profile(tab, kind, new_kind, ratio, output, guess);
         for (int i = 0; i < m; i++) top = larger(top, guess[i]);
         int s = panel->active[a];
-        bool pressed = (is_elastic(fl, s) && !is_round(fl, s)) || is_rigid(fl, s);
+        bool pressed = (is_elastic(fl, s) || is_rigid(fl, s)) && !is_round(fl, s);
         for (int i = 0; i < m; i++) output[i] = !pressed ? guess[i] : larger(guess[i], SMALLEST * top);
     }
 }
@@ -202,7 +202,8 @@ static void guess_outputs(const Flow *fl, const Gauss *tab, double phase, const 
         for (int i = 0; i < m; i++) delta[i] = push;
         return;
     }
-    Impact hit = expected_contact(fl, stop, w, phase);
+    Impact hit = {0.0, 0.0, 0.0};
+    if (is_elastic(fl, stop)) hit = expected_contact(fl, stop, w, phase);
     Value out = creep(fl, stop, w, phase, hit.duration);
     if (out.value > 0.0) {
         for (int i = 0; i < m; i++) {

@@ -37,12 +37,6 @@ static bool is_sprung(const Flow *fl, int s) { return stop_of(fl, s)->place >= 0
 
 static bool is_strained(const Flow *fl, int s) { return is_sprung(fl, s) && fl->slides[s] == 0; }
 
-/* whether a force keeps an acceleration at zero: that of a rigid gap, or of a slider that sticks */
-static bool is_held(const Flow *fl, int s)
-{
-    return is_rigid(fl, s) || (is_slider(fl, s) && fl->slides[s] == 0 && !is_sprung(fl, s));
-}
-
 /* whether a row is the first direction of a round clearance, or the second */
 static bool is_round(const Flow *fl, int s) { return stop_of(fl, s)->second >= 0.0; }
 
@@ -50,16 +44,27 @@ static bool is_second(const Flow *fl, int s) { return stop_of(fl, s)->lead >= 0.
 
 static bool is_planar(const Flow *fl, int s) { return is_round(fl, s) || is_second(fl, s); }
 
+/* whether a force keeps an acceleration at zero, that of one row: of a rigid gap, or of a slider that
+ * sticks */
+static bool is_held(const Flow *fl, int s)
+{
+    if (is_planar(fl, s)) return false;
+    return is_rigid(fl, s) || (is_slider(fl, s) && fl->slides[s] == 0 && !is_sprung(fl, s));
+}
+
 /* whether a row is the second direction of a round clearance with friction, and whether its surface
  * sticks there */
 static bool rubs_around(const Flow *fl, int s) { return is_second(fl, s) && stop_of(fl, s)->rub > 0.0; }
 
 static bool sticks_around(const Flow *fl, int s) { return rubs_around(fl, s) && fl->slides[s] == 0; }
 
-/* the same of either direction */
+/* whether the force of either row of a round clearance keeps an acceleration: that of a rigid one, or of
+ * a surface that sticks */
 static bool holds_around(const Flow *fl, int s)
 {
-    return sticks_around(fl, is_round(fl, s) ? (int)stop_of(fl, s)->second : s);
+    if (!is_planar(fl, s)) return false;
+    int lead = is_round(fl, s) ? s : (int)stop_of(fl, s)->lead;
+    return is_rigid(fl, lead) || sticks_around(fl, (int)stop_of(fl, lead)->second);
 }
 
 /* whether a row has friction that is pressed on: a slider or a round clearance */

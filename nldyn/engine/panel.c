@@ -31,7 +31,7 @@ static void renew_panel(const Flow *fl, Panel *panel, const int *active, int na)
         panel->active[a] = active[a];
         panel->round = panel->round || is_round(fl, active[a]);
         if (panel->outputs == na && needs_speed(fl, active[a])) panel->outputs = 2 * na;
-        if (sticks_around(fl, active[a])) panel->outputs = 3 * na;
+        if (holds_around(fl, active[a])) panel->outputs = 3 * na;
     }
     for (int i = 0; i < panel->outputs * panel->m; i++) panel->output[i] = 0.0;
     for (int a = 0; a < na; a++) panel->decayed[a] = panel->decay[a] = 0.0;

@@ -150,20 +150,21 @@ static void fill_response_tails(const Flow *fl, const Gauss *tab, Panel *panel, 
     panel->weighed = true;
 }
 
-/* largest penetration at the nodes */
-static double deepest_of(const Flow *fl, const Panel *panel, int a)
-{
-    int first = is_second(fl, panel->active[a]) ? partner_of(fl, panel, a) : a;
-    bool round = is_round(fl, panel->active[first]);
-    return largest((round ? panel->radial : panel->output) + (size_t)first * panel->m, panel->m);
-}
-
 /* largest of numbers (na, m) of a stop, of both directions at a round clearance */
 static double largest_of(const Flow *fl, const Panel *panel, const double *values, int a)
 {
     int m = panel->m, partner = panel->round ? partner_of(fl, panel, a) : -1;
     double found = largest(values + (size_t)a * m, m);
     return partner < 0 ? found : larger(found, largest(values + (size_t)partner * m, m));
+}
+
+/* largest penetration at the nodes; of a rigid round clearance, which has none, displacement */
+static double deepest_of(const Flow *fl, const Panel *panel, int a)
+{
+    int first = is_second(fl, panel->active[a]) ? partner_of(fl, panel, a) : a;
+    int s = panel->active[first];
+    if (!is_round(fl, s) || is_rigid(fl, s)) return largest_of(fl, panel, panel->output, a);
+    return largest(panel->radial + (size_t)first * panel->m, panel->m);
 }
 
 /* Legendre tail (value) and largest (slope) of what a stop's force changes by, times dχ/ds */
@@ -207,6 +208,9 @@ static bool output_resolved(const Flow *fl, const Gauss *tab, int kind, double h
     if (is_bond(fl, closed)) shake = BLIND * noise[a] * largest(panel->slope + (size_t)a * m, m);
     if (o < na && na < panel->outputs)
         shake += BLIND * noise[na + a] * largest(panel->slope + (size_t)(na + a) * m, m);
+    if (o < na && 2 * na < panel->outputs) /* accelerations cancel, too, where a force keeps one */
+        shake += BLIND * noise[2 * na + a] *
+                 largest_of(fl, panel, panel->slope + (size_t)(2 * na) * m, a);
     if (o < na && legendre_tail(tab, F) > tail * strongest + shake) return false;
     shake *= stop->exponent / deepest * largest(tab->slope + (size_t)kind * m, m);
     Value slopes = slope_tail(fl, tab, panel, s->slopes, o);

@@ -29,9 +29,10 @@ static int held_stops(const Motion *M, bool with_sliders)
     return n;
 }
 
-/* slider that a rigid stop presses on, or -1 */
+/* what a rigid stop presses on, or -1: a slider, of a round clearance the row of its friction */
 static int rubbed_by(const Flow *fl, int stop)
 {
+    if (is_round(fl, stop)) return (int)stop_of(fl, stop)->second;
     for (int s = stop + 1; s < fl->n_stops && is_rigid(fl, stop); s++)
         if (is_pressed(fl, s) && (int)stop_of(fl, s)->normal == stop) return s;
     return -1;
@@ -47,7 +48,7 @@ static int sliding_with(const Motion *M, int stop)
 /* friction there per unit of its force, in the sense of sliding */
 static double rubbing_share(const Flow *fl, int slider)
 {
-    return slider < 0 ? 0.0 : fl->slides[slider] * stop_of(fl, slider)->friction;
+    return slider < 0 ? 0.0 : fl->slides[slider] * grip(fl, slider);
 }
 
 /* rows that a force acts on together, and its shares in them */
@@ -56,34 +57,45 @@ typedef struct {
     double share[2];
 } RowsAlong;
 
-/* those of what is held: of a surface in a round clearance both directions, see `fill_across` */
+/* those of what is held: in a round clearance both directions, along the circle for its surface,
+ * along the radius for itself, see `fill_directions` */
 static RowsAlong held_along(const Motion *M, int s)
 {
-    if (!is_second(M->fl, s)) return (RowsAlong){1, {s}, {1.0}};
-    int lead = (int)stop_of(M->fl, s)->lead;
-    return (RowsAlong){2, {lead, s}, {M->s->across[lead], M->s->across[s]}};
+    if (!is_planar(M->fl, s)) return (RowsAlong){1, {s}, {1.0}};
+    const double *along = is_second(M->fl, s) ? M->s->across : M->s->outward;
+    int lead = is_second(M->fl, s) ? (int)stop_of(M->fl, s)->lead : s;
+    int second = (int)stop_of(M->fl, lead)->second;
+    return (RowsAlong){2, {lead, second}, {along[lead], along[second]}};
 }
 
 /* the same of what holds it, with what slides on it */
 static RowsAlong holding_along(const Motion *M, int s)
 {
-    int slider = sliding_with(M, s);
-    return slider < 0 ? held_along(M, s)
-                      : (RowsAlong){2, {s, slider}, {1.0, rubbing_share(M->fl, slider)}};
+    int slider = is_rigid(M->fl, s) ? sliding_with(M, s) : -1;
+    RowsAlong along = held_along(M, s);
+    if (slider < 0) return along;
+    double share = rubbing_share(M->fl, slider);
+    if (!is_round(M->fl, s)) return (RowsAlong){2, {s, slider}, {1.0, share}};
+    for (int d = 0; d < 2; d++) along.share[d] += share * M->s->across[along.row[d]];
+    return along;
 }
 
-/* fill s->across (n_stops,): directions along the circles of closed round clearances */
-static void fill_across(const Motion *M, double phase)
+/* fill directions in round clearances: s->across (n_stops,) along the circle, s->outward to where the
+ * body presses */
+static void fill_directions(const Motion *M, double phase)
 {
     const Flow *fl = M->fl;
     for (int s = 0; s < fl->n_stops; s++) {
-        if (!rubs_around(fl, s) || !M->closed[s]) continue;
+        if (!is_second(fl, s)) continue;
         double place[2], speed[2], pace[2];
         int lead = (int)stop_of(fl, s)->lead;
         round_now(fl, lead, M->w, phase, place, speed, pace);
         Polar at = polar(fl, lead, place, speed);
-        M->s->across[lead] = -at.n[1];
-        M->s->across[s] = at.n[0];
+        int rows[2] = {lead, s};
+        for (int d = 0; d < 2; d++) {
+            M->s->outward[rows[d]] = stop_of(fl, lead)->sense * at.n[d];
+            M->s->across[rows[d]] = d == 0 ? -at.n[1] : at.n[0];
+        }
     }
 }
 
@@ -99,11 +111,12 @@ static double sum_along(RowsAlong along, const double *values)
 static double held_pace(const Motion *M, int s, const double *rates, double phase)
 {
     double pace = sum_along(held_along(M, s), rates);
-    if (!is_second(M->fl, s)) return pace;
+    if (!is_planar(M->fl, s)) return pace;
     double place[2], speed[2], flight[2];
-    int lead = (int)stop_of(M->fl, s)->lead;
+    int lead = is_second(M->fl, s) ? (int)stop_of(M->fl, s)->lead : s;
     round_now(M->fl, lead, M->w, phase, place, speed, flight);
     Polar at = polar(M->fl, lead, place, speed);
+    if (lead == s) return pace + stop_of(M->fl, s)->sense * at.across * at.across / at.radius;
     return pace - at.across * (at.n[0] * speed[0] + at.n[1] * speed[1]) / at.radius;
 }
 
@@ -125,22 +138,26 @@ static double held_on(const Motion *M, int s)
     return stop_of(fl, s)->sense * out;
 }
 
-/* speed that a unit impulse at what is held, with that of what slides on it, takes from a row */
+/* speed along some rows that a unit impulse along others takes */
+static double taken_along(const Flow *fl, RowsAlong of, RowsAlong by)
+{
+    double taken = 0.0;
+    for (int a = 0; a < of.count; a++)
+        for (int b = 0; b < by.count; b++)
+            taken += of.share[a] * by.share[b] * between(fl, of.row[a], by.row[b]);
+    return taken;
+}
+
+/* that which one at what is held, with that of what slides on it, takes from a row */
 static double taken_by(const Motion *M, int row, int other)
 {
-    RowsAlong by = holding_along(M, other);
-    double taken = 0.0;
-    for (int d = 0; d < by.count; d++) taken += by.share[d] * between(M->fl, row, by.row[d]);
-    return taken;
+    return taken_along(M->fl, (RowsAlong){1, {row}, {1.0}}, holding_along(M, other));
 }
 
 /* and from what is held */
 static double held_by(const Motion *M, int stop, int other)
 {
-    RowsAlong of = held_along(M, stop);
-    double taken = 0.0;
-    for (int d = 0; d < of.count; d++) taken += of.share[d] * taken_by(M, of.row[d], other);
-    return taken;
+    return taken_along(M->fl, held_along(M, stop), holding_along(M, other));
 }
 
 /* fill and factor the speeds of closing per unit impulse of each of the `resting` stops, (n, n) */
@@ -176,7 +193,7 @@ static void contact_forces(const Motion *M, double phase)
         if (forces[b] != 0.0)
             for (int s = 0; s < n; s++) rates[s] -= between(fl, s, b) * forces[b];
     fill_drags(M, phase);
-    fill_across(M, phase);
+    fill_directions(M, phase);
     int count = held_stops(M, true);
     if (count == 0) return;
     const int *stops = M->s->resting;
@@ -216,10 +233,9 @@ static int hit_stop(const Motion *M, double phase, int first, double roundings, 
     *fastest = 0.0;
     for (int s = 0; s < fl->n_stops; s++) {
         if (!is_rigid(fl, s)) continue;
-        Course at = output_now(fl, s, M->w, phase);
-        double depth = at.value - stop_of(fl, s)->gap;
-        bool shut = s == first || depth >= -SHUT * output_noise(fl, s, M->w);
-        if (shut && at.first > larger(*fastest, roundings * rate_noise(fl, s, M->w))) {
+        Course at = depth_now(fl, s, M->w, phase);
+        bool shut = s == first || at.value >= -SHUT * gap_noise(fl, s, M->w);
+        if (shut && at.first > larger(*fastest, roundings * gap_rate_noise(fl, s, M->w, phase))) {
             hit = s;
             *fastest = at.first;
         }
@@ -231,23 +247,16 @@ static int hit_stop(const Motion *M, double phase, int first, double roundings, 
 static bool is_low(const Motion *M, int stop, double rebound, double push)
 {
     return push > 0.0 &&
-           rebound * rebound <= 2.0 * LOW * output_noise(M->fl, stop, M->w) * push;
+           rebound * rebound <= 2.0 * LOW * gap_noise(M->fl, stop, M->w) * push;
 }
 
 /* leave out of the stops on which a body is at rest those that it parts from */
 static void leave_parting(const Motion *M, double phase, bool *still)
 {
-    for (int s = 0; s < M->fl->n_stops; s++)
-        if (still[s])
-            still[s] = output_now(M->fl, s, M->w, phase).first >= -SHUT * rate_noise(M->fl, s, M->w);
-}
-
-/* fill `shift` (n_columns,): change of the instant at which a gap closes */
-static void instant_shift(const Motion *M, int stop, double phase, double t, double *shift)
-{
-    double speed = output_now(M->fl, stop, M->w, phase).first;
-    depth_columns(M, stop, phase, t, shift);
-    for (int c = 0; c < M->n_columns; c++) shift[c] = -shift[c] / speed;
+    const Flow *fl = M->fl;
+    for (int s = 0; s < fl->n_stops; s++)
+        if (still[s] && is_rigid(fl, s))
+            still[s] = depth_now(fl, s, M->w, phase).first >= -SHUT * gap_rate_noise(fl, s, M->w, phase);
 }
 
 /* add to sensitivities what s->rate makes of a shift in time (n_columns,), forth or back */
@@ -271,7 +280,76 @@ static void shifted_columns(const Motion *M, int stop, int order, double phase, 
     Course more = swelling(fl, stop, phase);
     double pace = order == 0 ? -fl->omega * turn.im + more.first
                              : -fl->omega * fl->omega * turn.re + more.second;
-    for (int c = 0; c < M->n_columns; c++) found[c] += pace * shift[c];
+    for (int c = 0; c < M->n_columns && shift; c++) found[c] += pace * shift[c];
+}
+
+/* fill those of a displacement from a centre, times a share */
+static void add_place_columns(const Motion *M, int row, double share, double phase, double t,
+                              const double *shift, double *found)
+{
+    const Flow *fl = M->fl;
+    double *moved = M->s->moved;
+    shifted_columns(M, row, 0, phase, t, shift, moved);
+    for (int c = 0; c < fl->n_parameters; c++)
+        if (is_parameter(fl, c, CENTRE, row)) moved[fl->size + c] -= 1.0;
+    for (int c = 0; c < M->n_columns; c++) found[c] += share * moved[c];
+}
+
+/* fill those of the penetration of a rigid stop; the instant does not shift without `shift` */
+static void gap_columns(const Motion *M, int stop, double phase, double t, const double *shift,
+                        double *found)
+{
+    const Flow *fl = M->fl;
+    RowsAlong along = held_along(M, stop);
+    double sense = is_round(fl, stop) ? stop_of(fl, stop)->sense : 1.0;
+    for (int c = 0; c < M->n_columns; c++) found[c] = 0.0;
+    for (int d = 0; d < along.count; d++)
+        add_place_columns(M, along.row[d], along.share[d], phase, t, shift, found);
+    for (int c = 0; c < fl->n_parameters; c++)
+        if (is_parameter(fl, c, GAP, stop)) found[fl->size + c] -= sense;
+}
+
+/* fill those of the turn of the directions in a round clearance */
+static void direction_columns(const Motion *M, int lead, double phase, double t, const double *shift,
+                         double *found)
+{
+    double place[2], speed[2], pace[2];
+    int rows[2] = {lead, (int)stop_of(M->fl, lead)->second};
+    round_now(M->fl, lead, M->w, phase, place, speed, pace);
+    double radius = hypot(place[0], place[1]);
+    for (int c = 0; c < M->n_columns; c++) found[c] = 0.0;
+    for (int d = 0; d < 2; d++)
+        add_place_columns(M, rows[d], M->s->across[rows[d]] / radius, phase, t, shift, found);
+}
+
+/* fill those of the speed of what is held */
+static void held_columns(const Motion *M, int s, double phase, double t, const double *shift,
+                         double *found)
+{
+    const Flow *fl = M->fl;
+    double *moved = M->s->moved;
+    RowsAlong along = held_along(M, s);
+    for (int c = 0; c < M->n_columns; c++) found[c] = 0.0;
+    if (is_planar(fl, s)) { /* the direction turns */
+        double place[2], speed[2], pace[2], sense = stop_of(fl, s)->sense;
+        round_now(fl, along.row[0], M->w, phase, place, speed, pace);
+        Polar at = polar(fl, along.row[0], place, speed);
+        direction_columns(M, along.row[0], phase, t, shift, found);
+        double by_turn = is_second(fl, s) ? -sense * at.rate : sense * at.across;
+        for (int c = 0; c < M->n_columns; c++) found[c] *= by_turn;
+    }
+    for (int d = 0; d < along.count; d++) {
+        shifted_columns(M, along.row[d], 1, phase, t, shift, moved);
+        for (int c = 0; c < M->n_columns; c++) found[c] += along.share[d] * moved[c];
+    }
+}
+
+/* fill `shift` (n_columns,): change of the instant at which a gap closes */
+static void instant_shift(const Motion *M, int stop, double phase, double t, double *shift)
+{
+    double speed = depth_now(M->fl, stop, M->w, phase).first;
+    gap_columns(M, stop, phase, t, NULL, shift);
+    for (int c = 0; c < M->n_columns; c++) shift[c] = -shift[c] / speed;
 }
 
 /* take impulses at a stop or slider, and their changes (n_columns,), from the state */
@@ -289,26 +367,64 @@ static void push_state(Motion *M, int stop, double impulse, const double *by)
 static double slip_at(const Motion *M, int slider, double phase)
 {
     const Flow *fl = M->fl;
+    if (is_second(fl, slider)) {
+        double speed = round_slip(fl, slider, M->w, phase).value;
+        return fabs(speed) <= SHUT * round_slip_noise(fl, slider, M->w, phase) ? 0.0 : speed;
+    }
     double belt = stop_of(fl, slider)->belt;
     double slip = output_now(fl, slider, M->w, phase).first - belt;
     double noise = SHUT * (rate_noise(fl, slider, M->w) + SUM_ROUNDING * fabs(belt));
     return fabs(slip) <= noise ? 0.0 : slip;
 }
 
-/* fill changes (n_columns,) of an impulse by those of the speeds of closing and sliding, of the
- * restitution and the friction */
-static void blow_columns(const Motion *M, int stop, int slider, const double *derivatives,
-                         const double *closing, const double *sliding, double *by)
+/* fill changes (n_columns,) of an impulse: by those of the speeds of closing and sliding, in s->closing
+ * and s->sliding, of the restitution and the friction, and in a round clearance by its turn */
+static void blow_columns(const Motion *M, int stop, int slider, Rubbing at, const Slopes *impulse,
+                         double *by)
 {
     const Flow *fl = M->fl;
+    const Scratch *s = M->s;
+    const double *slopes = impulse->by;
+    double turn = 0.0;
+    if (is_round(fl, stop)) {
+        double sense = stop_of(fl, stop)->sense, both = sense * at.both;
+        turn = 2.0 * both * (slopes[BY_NORMAL] - slopes[BY_TANGENT]) +
+               sense * (at.tangent - at.normal) * slopes[BY_BOTH];
+    }
     for (int c = 0; c < M->n_columns; c++) {
-        by[c] = closing[c] * derivatives[BY_SPEED];
-        if (slider >= 0) by[c] += sliding[c] * derivatives[BY_SLIP];
+        by[c] = s->closing[c] * slopes[BY_SPEED];
+        if (slider >= 0) by[c] += s->sliding[c] * slopes[BY_SLIP];
+        if (turn != 0.0) by[c] += s->turning[c] * turn;
     }
     for (int c = 0; c < fl->n_parameters; c++) {
-        if (is_parameter(fl, c, RESTITUTION, stop)) by[fl->size + c] += derivatives[BY_RESTITUTION];
-        if (slider >= 0 && is_parameter(fl, c, FRICTION, slider))
-            by[fl->size + c] += derivatives[BY_FRICTION];
+        int64_t row = fl->parameters[2 * c + 1];
+        if (is_parameter(fl, c, RESTITUTION, stop)) by[fl->size + c] += slopes[BY_RESTITUTION];
+        if (slider < 0) continue;
+        bool rub = is_round(fl, stop) && fl->parameters[2 * c] == RUB && row == stop;
+        if (rub || is_parameter(fl, c, FRICTION, slider)) by[fl->size + c] += slopes[BY_FRICTION];
+    }
+}
+
+/* take an impulse along some rows, and its changes, from the state */
+static void push_rows(Motion *M, RowsAlong along, double impulse, const double *by)
+{
+    double *share = M->s->along_columns;
+    for (int d = 0; d < along.count; d++) {
+        for (int c = 0; c < M->n_columns && M->with_columns; c++) share[c] = along.share[d] * by[c];
+        push_state(M, along.row[d], along.share[d] * impulse, share);
+    }
+}
+
+/* take what impulses along the normal and the tangent change by as both turn from the sensitivities */
+static void turn_impulses(Motion *M, int stop, double normal, double tangent)
+{
+    RowsAlong out = held_along(M, stop);
+    double *by = M->s->along_columns, sense = stop_of(M->fl, stop)->sense;
+    for (int d = 0; d < 2; d++) {
+        int row = out.row[d];
+        double turn = sense * (normal * M->s->across[row] - tangent * M->s->outward[row]);
+        for (int c = 0; c < M->n_columns; c++) by[c] = turn * M->s->turning[c];
+        push_state(M, row, 0.0, by);
     }
 }
 
@@ -319,47 +435,25 @@ static void strike(Motion *M, int stop, double speed, Value restitution, double 
     const Flow *fl = M->fl;
     Scratch *s = M->s;
     int slider = rubbed_by(fl, stop);
-    Rubbing at = {stop_of(fl, stop)->mobility, 0.0, 1.0, 0.0};
-    if (slider >= 0)
-        at = (Rubbing){at.normal, between(fl, stop, slider), stop_of(fl, slider)->mobility,
-                       stop_of(fl, slider)->friction};
+    RowsAlong normal = held_along(M, stop), tangent = normal;
+    Rubbing at = {taken_along(fl, normal, normal), 0.0, 1.0, 0.0};
+    if (slider >= 0) {
+        tangent = held_along(M, slider);
+        at = (Rubbing){at.normal, taken_along(fl, normal, tangent),
+                       taken_along(fl, tangent, tangent), grip(fl, slider)};
+    }
     Blow hit = blow(at, restitution, speed, slider < 0 ? 0.0 : slip_at(M, slider, phase));
+    double *changed[2] = {s->gained, s->rubbed};
     if (M->with_columns) {
-        shifted_columns(M, stop, 1, phase, t, shift, s->closing);
-        if (slider >= 0) shifted_columns(M, slider, 1, phase, t, shift, s->sliding);
-        blow_columns(M, stop, slider, hit.normal_by, s->closing, s->sliding, s->moved);
+        held_columns(M, stop, phase, t, shift, s->closing);
+        if (slider >= 0) held_columns(M, slider, phase, t, shift, s->sliding);
+        if (is_round(fl, stop)) direction_columns(M, stop, phase, t, shift, s->turning);
+        blow_columns(M, stop, slider, at, &hit.normal, changed[0]);
+        blow_columns(M, stop, slider, at, &hit.tangent, changed[1]);
+        if (is_round(fl, stop)) turn_impulses(M, stop, hit.normal.value, hit.tangent.value);
     }
-    push_state(M, stop, hit.normal, s->moved);
-    if (slider < 0) return;
-    if (M->with_columns)
-        blow_columns(M, stop, slider, hit.tangent_by, s->closing, s->sliding, s->moved);
-    push_state(M, slider, hit.tangent, s->moved);
-}
-
-/* the same of the speed of what is held */
-static void held_columns(const Motion *M, int s, double phase, double t, const double *shift,
-                         double *found)
-{
-    const Flow *fl = M->fl;
-    if (!is_second(fl, s)) {
-        shifted_columns(M, s, 1, phase, t, shift, found);
-        return;
-    }
-    double place[2], speed[2], pace[2], *moved = M->s->closing;
-    RowsAlong along = held_along(M, s);
-    int lead = along.row[0];
-    round_now(fl, lead, M->w, phase, place, speed, pace);
-    Polar at = polar(fl, lead, place, speed);
-    double turning = (at.n[0] * speed[0] + at.n[1] * speed[1]) / at.radius;
-    for (int c = 0; c < M->n_columns; c++) found[c] = 0.0;
-    for (int d = 0; d < 2; d++)
-        for (int order = 0; order < 2; order++) {
-            shifted_columns(M, along.row[d], order, phase, t, shift, moved);
-            for (int c = 0; c < fl->n_parameters && order == 0; c++)
-                if (is_parameter(fl, c, CENTRE, along.row[d])) moved[fl->size + c] -= 1.0;
-            double share = along.share[d] * (order == 1 ? 1.0 : -turning);
-            for (int c = 0; c < M->n_columns; c++) found[c] += share * moved[c];
-        }
+    push_rows(M, normal, hit.normal.value, changed[0]);
+    if (slider >= 0) push_rows(M, tangent, hit.tangent.value, changed[1]);
 }
 
 /* fill s->offsets (count, 1 + n): gaps (rate 0) of the `resting` stops or the rates, and their
@@ -371,16 +465,14 @@ static void fill_offsets(const Motion *M, double phase, double t, const double *
     for (int a = 0; a < count; a++) {
         int stop = M->s->resting[a];
         double *off = M->s->offsets + (size_t)a * (1 + n);
-        Course at = output_now(fl, stop, M->w, phase);
-        off[0] = rate == 1 ? at.first - stop_of(fl, stop)->belt : at.value - stop_of(fl, stop)->gap;
+        Course at = depth_now(fl, stop, M->w, phase);
+        off[0] = rate == 1 ? at.first - stop_of(fl, stop)->belt : at.value;
         if (is_second(fl, stop)) off[0] = round_slip(fl, stop, M->w, phase).value;
         if (n == 0) continue;
         if (rate == 1)
             held_columns(M, stop, phase, t, shift, off + 1);
         else
-            shifted_columns(M, stop, 0, phase, t, shift, off + 1);
-        for (int c = 0; c < fl->n_parameters; c++)
-            if (rate == 0 && is_parameter(fl, c, GAP, stop)) off[1 + fl->size + c] -= 1.0;
+            gap_columns(M, stop, phase, t, shift, off + 1);
     }
 }
 
@@ -403,7 +495,7 @@ static void hold(Motion *M, double phase, double t, const double *shift)
     const Flow *fl = M->fl;
     Scratch *s = M->s;
     int n = M->with_columns ? M->n_columns : 0, factored = 0; /* rates: the same stops, or more */
-    fill_across(M, phase);
+    fill_directions(M, phase);
     for (int rate = 0; rate < 2; rate++) {
         int count = held_stops(M, rate == 1);
         if (count == 0) continue;
@@ -439,25 +531,36 @@ static void loosen_slider(const Motion *M, int s, double phase, double roundings
     M->panel->na = -1; /* its equations are others now */
 }
 
+/* whether a rigid stop on which a body rests moves as a slider does */
+static bool holds_slider(const Motion *M, int s)
+{
+    for (int r = 0; r < M->fl->n_stops; r++) {
+        bool flat = is_rigid(M->fl, r) && !is_round(M->fl, r);
+        if (flat && M->closed[r] && moves_with(M->fl, s, r)) return true;
+    }
+    return false;
+}
+
 /* Leave sliders out that move as a rigid stop does on which a body rests: that holds them, and what
  * they would hold is not told. They are taken back when it lets go. What a rigid stop presses on
- * acts as long as a body rests there. */
+ * acts as long as a body rests there, and so do the second rows of rigid round clearances. */
 static void hand_over_sliders(const Motion *M, double phase, double roundings)
 {
     const Flow *fl = M->fl;
     for (int s = 0; s < fl->n_stops; s++) {
-        if (!is_slider(fl, s) || is_sprung(fl, s)) continue;
-        bool acts = !is_pressed(fl, s) || M->closed[(int)stop_of(fl, s)->normal];
-        bool rubs = stop_of(fl, s)->belt != 0.0; /* what is held still slides on that */
-        for (int r = 0; r < fl->n_stops && acts && !rubs; r++) {
-            if (!(is_rigid(fl, r) && M->closed[r])) continue;
-            acts = !moves_with(fl, s, r);
+        bool around = is_second(fl, s) && is_rigid(fl, (int)stop_of(fl, s)->lead), acts;
+        if (!around && (!is_slider(fl, s) || is_sprung(fl, s))) continue;
+        if (around) {
+            acts = M->closed[(int)stop_of(fl, s)->lead];
+        } else { /* what is held still slides on a belt */
+            acts = !is_pressed(fl, s) || M->closed[(int)stop_of(fl, s)->normal];
+            acts = acts && (stop_of(fl, s)->belt != 0.0 || !holds_slider(M, s));
         }
         if (acts == M->closed[s]) continue;
         M->closed[s] = acts;
         fl->slides[s] = 0;
         M->panel->na = -1;
-        if (acts && is_pressed(fl, s)) loosen_slider(M, s, phase, roundings);
+        if (acts && (is_pressed(fl, s) || rubs_around(fl, s))) loosen_slider(M, s, phase, roundings);
     }
 }
 
@@ -487,7 +590,8 @@ static void slip_of(const Motion *M, double phase, bool all)
         contact_forces(M, phase);
         for (int s = 0; s < fl->n_stops; s++) {
             if (!is_stuck(M, s)) continue;
-            if (!all && !(is_pressed(fl, s) && is_rigid(fl, (int)stop_of(fl, s)->normal))) continue;
+            int pressing = (int)(is_second(fl, s) ? stop_of(fl, s)->lead : stop_of(fl, s)->normal);
+            if (!all && !(pressing >= 0 && is_rigid(fl, pressing))) continue;
             double load = fabs(held_force(M, s)) / (grip(fl, s) * larger(held_on(M, s), 0.0));
             if (!(load > most)) continue;
             most = load;
@@ -578,8 +682,8 @@ static void slide_or_stick(Motion *M, int s, double phase, double t)
     }
     double pace = held_pace(M, s, M->s->pushes, phase);
     if (M->with_columns) {
-        held_columns(M, s, phase, t, shift, M->s->moved);
-        for (int c = 0; c < M->n_columns; c++) shift[c] = -M->s->moved[c] / pace;
+        held_columns(M, s, phase, t, shift, M->s->sliding);
+        for (int c = 0; c < M->n_columns; c++) shift[c] = -M->s->sliding[c] / pace;
     }
     jump_to(M, s, 0, phase, t, shift);
 }
@@ -591,31 +695,31 @@ static void close_shut(Motion *M, int first, double phase, double roundings, con
     const Flow *fl = M->fl;
     for (int s = 0; s < fl->n_stops; s++) {
         if (!is_rigid(fl, s)) continue;
-        Course at = output_now(fl, s, M->w, phase);
+        Course at = depth_now(fl, s, M->w, phase);
         bool shut = s == first || M->closed[s] || struck[s];
-        double depth = at.value - stop_of(fl, s)->gap;
-        shut = shut || depth >= -roundings * output_noise(fl, s, M->w);
-        M->closed[s] = shut && fabs(at.first) <= roundings * rate_noise(fl, s, M->w);
+        shut = shut || at.value >= -roundings * gap_noise(fl, s, M->w);
+        M->closed[s] = shut && fabs(at.first) <= roundings * gap_rate_noise(fl, s, M->w, phase);
     }
     hand_over_sliders(M, phase, roundings);
     contact_forces(M, phase);
     for (int s = 0; s < fl->n_stops; s++) {
         if (!is_rigid(fl, s) || M->closed[s]) continue;
-        Course at = output_now(fl, s, M->w, phase);
-        double depth = at.value - stop_of(fl, s)->gap;
-        bool shut = depth >= -roundings * output_noise(fl, s, M->w);
-        M->closed[s] = shut && at.first < 0.0 && is_low(M, s, -at.first, M->s->pushes[s]);
+        Course at = depth_now(fl, s, M->w, phase);
+        bool shut = at.value >= -roundings * gap_noise(fl, s, M->w);
+        double push = held_pace(M, s, M->s->pushes, phase);
+        M->closed[s] = shut && at.first < 0.0 && is_low(M, s, -at.first, push);
     }
     hand_over_sliders(M, phase, roundings);
 }
 
 /* whether a rigid stop may hold what slides on it one way by nothing but its own friction */
-static bool may_jam(const Flow *fl, int stop)
+static bool may_jam(const Motion *M, int stop)
 {
-    int slider = rubbed_by(fl, stop);
+    int slider = rubbed_by(M->fl, stop);
     if (slider < 0) return false;
-    double both = fabs(between(fl, stop, slider));
-    return stop_of(fl, stop)->mobility <= stop_of(fl, slider)->friction * both;
+    RowsAlong normal = held_along(M, stop);
+    double both = fabs(taken_along(M->fl, normal, held_along(M, slider)));
+    return taken_along(M->fl, normal, normal) <= grip(M->fl, slider) * both;
 }
 
 /* Look for a rigid stop whose force nothing tells, or more than one, with friction: where the forces
@@ -647,11 +751,12 @@ static void find_undecided(Motion *M)
 static void find_jammed(Motion *M, double phase)
 {
     const Flow *fl = M->fl;
-    const double *forces = M->s->stop_forces;
     for (int r = 0; r < fl->n_stops; r++) {
-        if (!(is_rigid(fl, r) && M->closed[r] && may_jam(fl, r))) continue;
+        if (!(is_rigid(fl, r) && M->closed[r] && may_jam(M, r))) continue;
         int slider = rubbed_by(fl, r);
-        double pressed = stop_of(fl, r)->mobility * forces[r] + between(fl, r, slider) * forces[slider];
+        RowsAlong normal = held_along(M, r);
+        double pressed = taken_along(fl, normal, normal) * held_force(M, r) +
+                         taken_along(fl, normal, held_along(M, slider)) * held_force(M, slider);
         if (pressed <= 0.0 && slip_at(M, slider, phase) == 0.0) M->undecided = r;
     }
 }
@@ -665,7 +770,8 @@ static void find_shared(Motion *M)
         if (!is_slider(fl, s) || !is_pressed(fl, s) || is_sprung(fl, s) || M->closed[s]) continue;
         if (!M->closed[(int)stop_of(fl, s)->normal] || grip(fl, s) == 0.0) continue;
         for (int r = 0; r < fl->n_stops; r++) {
-            int rubbing = is_rigid(fl, r) && M->closed[r] && moves_with(fl, s, r) ? rubbed_by(fl, r) : -1;
+            bool flat = is_rigid(fl, r) && !is_round(fl, r);
+            int rubbing = flat && M->closed[r] && moves_with(fl, s, r) ? rubbed_by(fl, r) : -1;
             if (rubbing >= 0 && M->closed[rubbing] && grip(fl, rubbing) > 0.0) M->undecided = r;
         }
     }
@@ -685,11 +791,14 @@ static void settle(Motion *M, int first, double phase, double t, const double *s
         contact_forces(M, phase);
         find_jammed(M, phase);
         if (M->undecided >= 0) return;
-        const double *forces = M->s->stop_forces;
+        double least = 0.0;
         int weakest = -1;
         for (int s = 0; s < fl->n_stops; s++) {
-            bool pulls = M->closed[s] && is_rigid(fl, s) && forces[s] <= 0.0;
-            if (pulls && (weakest < 0 || forces[s] < forces[weakest])) weakest = s;
+            if (!(M->closed[s] && is_rigid(fl, s))) continue;
+            double force = held_force(M, s);
+            if (force > least || (weakest >= 0 && force == least)) continue;
+            weakest = s;
+            least = force;
         }
         if (weakest < 0) break;
         M->closed[weakest] = false;
@@ -728,7 +837,7 @@ static void impact(Motion *M, int first, bool crossed, double phase, double t)
     contact_forces(M, phase);
     double *pushes = M->s->first_pushes; /* those before the impacts */
     for (int s = 0; s < fl->n_stops; s++) {
-        pushes[s] = M->s->pushes[s];
+        pushes[s] = is_rigid(fl, s) ? held_pace(M, s, M->s->pushes, phase) : 0.0;
         struck[s] = false;
         still[s] = M->closed[s];
     }
@@ -772,10 +881,10 @@ static void impact(Motion *M, int first, bool crossed, double phase, double t)
 static double departure(const Motion *M, int stop, double phase)
 {
     const Flow *fl = M->fl;
-    double noise = 100.0 * output_noise(fl, stop, M->w), t = M->shortest;
+    double noise = 100.0 * gap_noise(fl, stop, M->w), t = M->shortest, holds;
     for (int i = 0; i < 60; i++) {
-        Course at = output_after(fl, stop, M->w, phase, t);
-        if (at.value - stop_of(fl, stop)->gap < -noise && at.first < 0.0) return t;
+        Course at = gap_after(fl, stop, stop, M->w, phase, t, &holds);
+        if (at.value < -noise && at.first < 0.0) return t;
         t *= 2.0;
         if (fl->omega * t > HIT_AGAIN) break;
     }

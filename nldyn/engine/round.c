@@ -13,6 +13,11 @@
  *
  *     t . X'' = (t . X') (n . X') / r.
  *
+ * A rigid ring or pin has impacts, see `rigid.c`, and while a body is on it the force N that keeps
+ * r at c,
+ *
+ *     n . X'' = -(t . X')² / r.
+ *
  * The row of the second direction has the friction: fl->slides tells of it, its events are those of
  * sliding and sticking. */
 #include "engine.h"
@@ -43,6 +48,19 @@ static Polar polar(const Flow *fl, int s, const double *place, const double *spe
     return at;
 }
 
+/* fill the mobilities M (2, 2) between both directions */
+static void round_mobilities(const Flow *fl, int s, double *M)
+{
+    int rows[2] = {s, (int)stop_of(fl, s)->second};
+    for (int i = 0; i < 4; i++) M[i] = between(fl, rows[i / 2], rows[i % 2]);
+}
+
+/* a M b of vectors (2,) */
+static double across_matrix(const double *a, const double *M, const double *b)
+{
+    return a[0] * (M[0] * b[0] + M[1] * b[1]) + a[1] * (M[2] * b[0] + M[3] * b[1]);
+}
+
 /* friction T and its derivatives: by the normal force, by a turn of n, by the radius, by the rates
  * along n and t, by the acceleration along t without the own forces */
 typedef struct {
@@ -62,15 +80,10 @@ static Friction round_friction(const Flow *fl, int s, const Polar *at, const dou
         return found;
     }
     if (!push) return found;
-    double both = 0.0, along = 0.0, across = 0.0; /* n M n, n M t, t M t */
-    int rows[2] = {s, second};
-    for (int i = 0; i < 2; i++)
-        for (int j = 0; j < 2; j++) {
-            double mobility = between(fl, rows[i], rows[j]);
-            both += n[i] * mobility * n[j];
-            along += n[i] * mobility * t[j];
-            across += t[i] * mobility * t[j];
-        }
+    double M[4];
+    round_mobilities(fl, s, M);
+    double both = across_matrix(n, M, n), along = across_matrix(n, M, t);
+    double across = across_matrix(t, M, t);
     double sense = stop_of(fl, s)->sense, out = n[0] * speed[0] + n[1] * speed[1], r = at->radius;
     found.share = -sense * along / across;
     found.by_push = 1.0 / across;
@@ -92,6 +105,69 @@ static void rubbing(double sense, double share, const Polar *at, double *along)
     along[1] = sense * at->n[1] + share * at->n[0];
 }
 
+/* The same as `round_law` of a rigid one on which the surface slides, or without friction: with T = ρN,
+ * the direction d = ± n + ρ t of the force and the accelerations a without it
+ *
+ *     N = (n . a + (t . X')² / r) / n . M d. */
+static void rigid_sliding_law(const Flow *fl, int s, const Polar *at, const double *speed,
+                              const double *push, double *force, double by[3][4])
+{
+    const double *n = at->n, t[2] = {-n[1], n[0]};
+    double sense = stop_of(fl, s)->sense, M[4], along[2], turned[2];
+    double share = fl->slides[(int)stop_of(fl, s)->second] * stop_of(fl, s)->rub;
+    double r = at->radius, w = at->across, u = n[0] * speed[0] + n[1] * speed[1];
+    round_mobilities(fl, s, M);
+    rubbing(sense, share, at, along);
+    for (int i = 0; i < 2; i++) turned[i] = sense * t[i] - share * n[i];
+    double lost = across_matrix(n, M, along);
+    double normal = (n[0] * push[0] + n[1] * push[1] + w * w / r) / lost;
+    double lost_by = across_matrix(t, M, along) + across_matrix(n, M, turned);
+    double by_turn = t[0] * push[0] + t[1] * push[1] - 2.0 * w * u / r - normal * lost_by;
+    for (int i = 0; i < 2; i++) {
+        force[i] = normal * along[i];
+        for (int j = 0; j < 2; j++) {
+            double turn = t[j] / r;
+            double change = (by_turn * turn - squared(w / r) * n[j]) / lost;
+            by[0][2 * i + j] = change * along[i] + normal * turned[i] * turn;
+            by[1][2 * i + j] = 2.0 * w / r * t[j] / lost * along[i];
+            by[2][2 * i + j] = n[j] / lost * along[i];
+        }
+    }
+}
+
+/* the same where the surface sticks: M F = a - X'' with all of X'' known */
+static void rigid_sticking_law(const Flow *fl, int s, const Polar *at, const double *speed,
+                               const double *push, double *force, double by[3][4])
+{
+    const double *n = at->n, t[2] = {-n[1], n[0]};
+    double M[4], r = at->radius, w = at->across, u = n[0] * speed[0] + n[1] * speed[1];
+    round_mobilities(fl, s, M);
+    double size = M[0] * M[3] - M[1] * M[2];
+    double inverse[4] = {M[3] / size, -M[1] / size, -M[2] / size, M[0] / size};
+    double inward = w * w / r, aside = -w * u / r, change[3][4];
+    for (int j = 0; j < 2; j++) {
+        double turn = t[j] / r; /* by which n, w and u change with a displacement */
+        double out_by[2] = {-2.0 * w * u / r * turn - squared(w / r) * n[j] - aside * turn,
+                            2.0 * w / r * t[j]};
+        double aside_by[2] = {inward * turn + (u * u - w * w) / r * turn + w * u / (r * r) * n[j],
+                              -(u * t[j] + w * n[j]) / r};
+        for (int i = 0; i < 2; i++) {
+            for (int order = 0; order < 2; order++)
+                change[order][2 * i + j] = out_by[order] * n[i] + aside_by[order] * t[i];
+            change[2][2 * i + j] = i == j;
+        }
+    }
+    for (int i = 0; i < 2; i++) {
+        force[i] = 0.0;
+        for (int k = 0; k < 2; k++)
+            force[i] += inverse[2 * i + k] * (push[k] + inward * n[k] + aside * t[k]);
+        for (int j = 0; j < 2; j++)
+            for (int order = 0; order < 3; order++)
+                by[order][2 * i + j] = inverse[2 * i] * change[order][j] +
+                                       inverse[2 * i + 1] * change[order][2 + j];
+    }
+}
+
 /* Forces (2,) of a closed one along both directions; fills their derivatives by the displacements,
  * the rates and the accelerations `push` without the own forces, each (2, 2) with a row for each
  * force: with the normal force's slope K and viscosity C, and the friction's share T_N
@@ -101,6 +177,11 @@ static void round_law(const Flow *fl, int s, const double *place, const double *
                       const double *push, double *force, double by[3][4])
 {
     Polar at = polar(fl, s, place, speed);
+    if (is_rigid(fl, s)) {
+        bool sticks = sticks_around(fl, (int)stop_of(fl, s)->second);
+        (sticks ? rigid_sticking_law : rigid_sliding_law)(fl, s, &at, speed, push, force, by);
+        return;
+    }
     double sense = stop_of(fl, s)->sense, along[2], *n = at.n, t[2] = {-n[1], n[0]};
     Force normal = closed_law(fl, s, at.depth, at.rate);
     double turn = at.radius > 0.0 ? 1.0 / at.radius : 0.0;
@@ -152,7 +233,7 @@ static Course depth_now(const Flow *fl, int s, const double *w, double phase)
     return (Course){at.depth, at.rate, stop_of(fl, s)->sense * push, 0.0};
 }
 
-/* force of a row; sliders that stops press on, and what holds a surface, are left out */
+/* force of a row; sliders that stops press on, and what keeps an acceleration, are left out */
 static double force_now(const Flow *fl, int s, const double *w, double phase)
 {
     if (!is_planar(fl, s)) {
@@ -160,6 +241,7 @@ static double force_now(const Flow *fl, int s, const double *w, double phase)
         return law(fl, s, depth.value, depth.first).force;
     }
     int lead = is_round(fl, s) ? s : (int)stop_of(fl, s)->lead;
+    if (is_rigid(fl, lead)) return 0.0;
     double place[2], speed[2], pace[2], force[2], by[3][4];
     round_now(fl, lead, w, phase, place, speed, pace);
     if (!(polar(fl, lead, place, speed).depth > 0.0)) return 0.0;
@@ -215,16 +297,24 @@ static Course round_slip(const Flow *fl, int s, const double *w, double phase)
     return (Course){at.across + stop_of(fl, s)->surface, push - at.across * out / at.radius, 0.0, 0.0};
 }
 
-/* rounding error of that speed */
-static double round_slip_noise(const Flow *fl, int s, const double *w, double phase)
+/* rounding error of the rate of `gap_now` */
+static double gap_rate_noise(const Flow *fl, int s, const double *w, double phase)
 {
-    double place[2], speed[2], pace[2], noise = SUM_ROUNDING * fabs(stop_of(fl, s)->surface);
-    int rows[2] = {(int)stop_of(fl, s)->lead, s};
-    round_now(fl, rows[0], w, phase, place, speed, pace);
+    if (!is_round(fl, s)) return rate_noise(fl, s, w);
+    double place[2], speed[2], pace[2], noise = 0.0;
+    int rows[2] = {s, (int)stop_of(fl, s)->second};
+    round_now(fl, s, w, phase, place, speed, pace);
     double turning = hypot(speed[0], speed[1]) / hypot(place[0], place[1]);
     for (int d = 0; d < 2; d++)
         noise += rate_noise(fl, rows[d], w) + turning * output_noise(fl, rows[d], w);
     return noise;
+}
+
+/* the same of the speed at which the surface slides */
+static double round_slip_noise(const Flow *fl, int s, const double *w, double phase)
+{
+    return SUM_ROUNDING * fabs(stop_of(fl, s)->surface) +
+           gap_rate_noise(fl, (int)stop_of(fl, s)->lead, w, phase);
 }
 
 /* velocity jump of the penetration per unit impulse, in 1/kg */
@@ -232,13 +322,11 @@ static double mobility_now(const Flow *fl, int s, const double *w, double phase)
 {
     const Stop *stop = stop_of(fl, s);
     if (!is_round(fl, s)) return stop->mobility;
-    double place[2], speed[2], pace[2], n[2], both = 0.0;
+    double place[2], speed[2], pace[2], M[4];
     round_now(fl, s, w, phase, place, speed, pace);
-    int rows[2] = {s, (int)stop->second};
-    for (int d = 0; d < 2; d++) n[d] = polar(fl, s, place, speed).n[d];
-    for (int i = 0; i < 2; i++)
-        for (int j = 0; j < 2; j++) both += n[i] * n[j] * between(fl, rows[i], rows[j]);
-    return both;
+    round_mobilities(fl, s, M);
+    Polar at = polar(fl, s, place, speed);
+    return across_matrix(at.n, M, at.n);
 }
 
 /* place of a stop among the closed ones */

@@ -29,7 +29,9 @@ static void round_forces(const Flow *fl, Panel *panel, int a, double *slope)
             for (int d = 0; d < 2; d++)
                 at[order][d] = panel->output[(order * na + places[d]) * m + i];
         round_law(fl, s, at[0], at[1], at[2], force, by);
-        panel->radial[a * m + i] = polar(fl, s, at[0], at[1]).depth;
+        Polar polar_at = polar(fl, s, at[0], at[1]);
+        double pressed = polar_at.n[0] * force[0] + polar_at.n[1] * force[1];
+        panel->radial[a * m + i] = is_rigid(fl, s) ? stop_of(fl, s)->sense * pressed : polar_at.depth;
         for (int d = 0; d < 2; d++) {
             int own = places[d] * m + i, cross = panel->outputs * m + own;
             panel->F[own] = force[d];
@@ -39,6 +41,18 @@ static void round_forces(const Flow *fl, Panel *panel, int a, double *slope)
             }
         }
     }
+}
+
+/* fill how both forces of a rigid one change with its coefficient of friction, by the normal force, in
+ * one `way` of sliding */
+static void rigid_rubbing_by(const Flow *fl, int s, const Polar *at, double pressed, int way,
+                             double *by)
+{
+    double M[4], along[2], t[2] = {-at->n[1], at->n[0]};
+    rubbing(stop_of(fl, s)->sense, way * stop_of(fl, s)->rub, at, along);
+    round_mobilities(fl, s, M);
+    double less = across_matrix(at->n, M, t) / across_matrix(at->n, M, along);
+    for (int d = 0; d < 2; d++) by[d] = way * pressed * (t[d] - less * along[d]);
 }
 
 /* add to the sensitivities of both forces of a round clearance at the node of output o, of its
@@ -54,9 +68,15 @@ static void add_round_columns(const Flow *fl, const Panel *panel, int o, int i, 
         if (panel->outputs > na) speed[d] = panel->output[(na + places[d]) * m + i];
     }
     Polar at = polar(fl, s, place, speed);
-    double pressed = closed_law(fl, s, at.depth, at.rate).force, sense = stop_of(fl, s)->sense;
-    rubbing(sense, round_friction(fl, s, &at, speed, still, pressed).share, &at, along);
+    double sense = stop_of(fl, s)->sense, rub_by[2];
     if (stop_of(fl, s)->rub == 0.0) way = at.across + stop_of(fl, s)->surface > 0.0 ? 1 : -1;
+    if (is_rigid(fl, s)) {
+        rigid_rubbing_by(fl, s, &at, panel->radial[o * m + i], way, rub_by);
+    } else {
+        double pressed = closed_law(fl, s, at.depth, at.rate).force;
+        rubbing(sense, round_friction(fl, s, &at, speed, still, pressed).share, &at, along);
+        for (int d = 0; d < 2; d++) rub_by[d] = way * pressed * (d == 0 ? -at.n[1] : at.n[0]);
+    }
     for (int c = 0; c < fl->n_parameters; c++) {
         int64_t column = fl->parameters[2 * c], row = fl->parameters[2 * c + 1];
         for (int d = 0; d < 2 && column >= GAP; d++) {
@@ -67,8 +87,8 @@ static void add_round_columns(const Flow *fl, const Panel *panel, int o, int i, 
             if (column == CENTRE && row == rows[1]) *force -= d == 1 ? *slope : *cross;
             if (row != s || column == CENTRE) continue;
             if (column == RUB)
-                *force += way * pressed * (d == 0 ? -at.n[1] : at.n[0]);
-            else
+                *force += rub_by[d];
+            else if (!is_rigid(fl, s)) /* whose clearance counts in the state, see `hold` */
                 *force += along[d] * law_by(fl, s, column, at.depth, at.rate) *
                           (column == GAP ? sense : 1.0);
         }

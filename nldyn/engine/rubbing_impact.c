@@ -19,64 +19,86 @@ typedef struct {
     double normal, both, tangent, friction;
 } Rubbing;
 
-enum BlowBy { BY_SPEED, BY_SLIP, BY_RESTITUTION, BY_FRICTION, N_BLOW_BY };
+enum BlowBy { BY_SPEED, BY_SLIP, BY_RESTITUTION, BY_FRICTION, BY_NORMAL, BY_BOTH, BY_TANGENT, N_BLOW_BY };
 
-/* impulses along the normal and the tangent, and their derivatives */
+/* a number and its derivatives by these */
 typedef struct {
-    double normal, tangent, normal_by[N_BLOW_BY], tangent_by[N_BLOW_BY];
+    double value, by[N_BLOW_BY];
+} Slopes;
+
+/* impulses along the normal and the tangent */
+typedef struct {
+    Slopes normal, tangent;
 } Blow;
 
-/* share ρ = dQ/dP of the friction from where sliding ends on, and its derivative by μ */
-static Value share_behind(Rubbing at)
+static Slopes number_by(double value, int place, double slope)
 {
-    double sticks = at.both == 0.0 ? 0.0 : -at.both / at.tangent;
-    if (fabs(sticks) <= at.friction) return (Value){sticks, 0.0};
-    return (Value){copysign(at.friction, sticks), copysign(1.0, sticks)};
+    Slopes found = {value, {0.0}};
+    found.by[place] = slope;
+    return found;
+}
+
+/* a + s b */
+static Slopes plus(Slopes a, double s, Slopes b)
+{
+    a.value += s * b.value;
+    for (int c = 0; c < N_BLOW_BY; c++) a.by[c] += s * b.by[c];
+    return a;
+}
+
+static Slopes multiplied(Slopes a, Slopes b)
+{
+    for (int c = 0; c < N_BLOW_BY; c++) a.by[c] = a.by[c] * b.value + a.value * b.by[c];
+    a.value *= b.value;
+    return a;
+}
+
+static Slopes divided(Slopes a, Slopes b)
+{
+    a.value /= b.value;
+    for (int c = 0; c < N_BLOW_BY; c++) a.by[c] = (a.by[c] - a.value * b.by[c]) / b.value;
+    return a;
+}
+
+/* share ρ = dQ/dP of the friction from where sliding ends on */
+static Slopes share_behind(Rubbing at, Slopes friction, Slopes both, Slopes tangent)
+{
+    if (at.tangent == 0.0) return (Slopes){0.0, {0.0}};
+    Slopes sticks = divided(plus((Slopes){0.0, {0.0}}, -1.0, both), tangent);
+    if (fabs(sticks.value) <= at.friction) return sticks;
+    return plus((Slopes){0.0, {0.0}}, copysign(1.0, sticks.value), friction);
 }
 
 /* sense in which it slides first; that of nothing is the one in which it will, or that comes to rest
  * the sooner */
-static double first_sense(Rubbing at, double slip, Value behind)
+static double first_sense(Rubbing at, double slip, double behind)
 {
     if (slip != 0.0) return copysign(1.0, slip);
-    return behind.slope != 0.0 ? behind.slope : behind.value > 0.0 ? -1.0 : 1.0;
+    bool slides = at.both != 0.0 && fabs(at.both / at.tangent) > at.friction;
+    return slides ? copysign(1.0, -at.both) : behind > 0.0 ? -1.0 : 1.0;
 }
 
 /* the impulses of an impact at a speed of closing and one of sliding */
 static Blow blow(Rubbing at, Value restitution, double speed, double slip)
 {
-    Value behind = share_behind(at);
-    double sense = first_sense(at, slip, behind), share = sense * at.friction;
-    double lost = at.normal + share * at.both, slowed = at.both + share * at.tangent;
-    double lost_behind = at.normal + behind.value * at.both, e = restitution.value;
-    double turn = slowed * sense > 0.0 ? slip / slowed : INFINITY; /* P at which sliding ends */
-    bool in_compression = !(lost > 0.0 && speed / lost <= turn);
-    double reach = in_compression ? speed + turn * (lost_behind - lost) : speed;
-    double rate = in_compression ? lost_behind : lost;
-    Blow found = {(1.0 + e) * reach / rate, 0.0, {0.0}, {0.0}};
-    bool turns = found.normal > turn;
-    double turn_by[N_BLOW_BY] = {0.0}, by_friction = sense * at.both;
-    double *normal_by = found.normal_by;
-    normal_by[BY_SPEED] = (1.0 + e + restitution.slope * reach) / rate;
-    normal_by[BY_RESTITUTION] = reach / rate;
-    normal_by[BY_FRICTION] = -found.normal * by_friction / rate;
-    if (turns) {
-        turn_by[BY_SLIP] = 1.0 / slowed;
-        turn_by[BY_FRICTION] = -turn * sense * at.tangent / slowed;
-    }
-    if (in_compression) {
-        double growth = normal_by[BY_SPEED]; /* by the reach */
-        double more = behind.slope * at.both;
-        normal_by[BY_SLIP] = growth * (lost_behind - lost) * turn_by[BY_SLIP];
-        normal_by[BY_FRICTION] = growth * ((lost_behind - lost) * turn_by[BY_FRICTION] +
-                                           turn * (more - by_friction)) -
-                                 found.normal * more / rate;
-    }
-    double then = turns ? behind.value : share, first = turns ? share - behind.value : 0.0;
-    found.tangent = then * found.normal + (turns ? first * turn : 0.0);
-    for (int c = 0; c < N_BLOW_BY; c++)
-        found.tangent_by[c] = then * normal_by[c] + first * turn_by[c];
-    found.tangent_by[BY_FRICTION] +=
-        turns ? behind.slope * found.normal + (sense - behind.slope) * turn : sense * found.normal;
-    return found;
+    Slopes normal = number_by(at.normal, BY_NORMAL, 1.0), both = number_by(at.both, BY_BOTH, 1.0);
+    Slopes tangent = number_by(at.tangent, BY_TANGENT, 1.0);
+    Slopes friction = number_by(at.friction, BY_FRICTION, 1.0);
+    Slopes reach = number_by(speed, BY_SPEED, 1.0), sliding = number_by(slip, BY_SLIP, 1.0);
+    Slopes grows = number_by(1.0 + restitution.value, BY_RESTITUTION, 1.0);
+    grows.by[BY_SPEED] = restitution.slope;
+    Slopes behind = share_behind(at, friction, both, tangent);
+    double sense = first_sense(at, slip, behind.value);
+    Slopes share = plus((Slopes){0.0, {0.0}}, sense, friction);
+    Slopes lost = plus(normal, 1.0, multiplied(share, both));
+    Slopes lost_behind = plus(normal, 1.0, multiplied(behind, both));
+    Slopes slowed = plus(both, 1.0, multiplied(share, tangent)); /* P at which sliding ends: */
+    Slopes turn = slowed.value * sense > 0.0 ? divided(sliding, slowed) : number_by(INFINITY, 0, 0.0);
+    bool in_compression = !(lost.value > 0.0 && speed / lost.value <= turn.value);
+    if (in_compression) reach = plus(reach, 1.0, multiplied(turn, plus(lost_behind, -1.0, lost)));
+    Slopes impulse = divided(multiplied(grows, reach), in_compression ? lost_behind : lost);
+    bool turns = impulse.value > turn.value;
+    Slopes rubbed = multiplied(turns ? behind : share, impulse);
+    if (turns) rubbed = plus(rubbed, 1.0, multiplied(plus(share, -1.0, behind), turn));
+    return (Blow){impulse, rubbed};
 }

@@ -84,10 +84,9 @@ static void leave_rigid_stops(Motion *M, int event, double phase)
     const Flow *fl = M->fl;
     for (int s = 0; s < fl->n_stops; s++) {
         if (!is_rigid(fl, s) || M->closed[s]) continue;
-        Course at = output_now(fl, s, M->w, phase);
-        double depth = at.value - stop_of(fl, s)->gap;
-        bool shut = s == event || depth >= -SHUT * output_noise(fl, s, M->w);
-        if (shut && fabs(at.first) <= SHUT * rate_noise(fl, s, M->w))
+        Course at = depth_now(fl, s, M->w, phase);
+        bool shut = s == event || at.value >= -SHUT * gap_noise(fl, s, M->w);
+        if (shut && fabs(at.first) <= SHUT * gap_rate_noise(fl, s, M->w, phase))
             M->skips[s] = departure(M, s, phase);
     }
 }

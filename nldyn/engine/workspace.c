@@ -67,7 +67,7 @@ static void lay_out_flow(Block *block, const System *sys, int n_parameters,
 static size_t most_orders(const Flow *fl)
 {
     for (int s = 0; s < fl->n_stops; s++)
-        if (rubs_around(fl, s)) return 3;
+        if (rubs_around(fl, s) || (is_round(fl, s) && is_rigid(fl, s))) return 3;
     return 2;
 }
 
@@ -153,6 +153,7 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     s->held = numbers(block, na);
     s->drags = numbers(block, na);
     s->across = numbers(block, na);
+    s->outward = numbers(block, na);
     s->mobility = numbers(block, na * na);
     s->resting = indices(block, na);
     s->mobility_order = indices(block, na);
@@ -163,6 +164,9 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     s->along_columns = numbers(block, n_columns);
     s->closing = numbers(block, n_columns);
     s->sliding = numbers(block, n_columns);
+    s->turning = numbers(block, n_columns);
+    s->gained = numbers(block, n_columns);
+    s->rubbed = numbers(block, n_columns);
     s->pull = numbers(block, size);
     s->offsets = numbers(block, na * (1 + n_columns));
     s->struck = flags(block, na);

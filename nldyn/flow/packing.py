@@ -55,6 +55,11 @@ def stop_row(
             instant=options.instant(0.0),
             restitution=restitution,
         )
+    if isinstance(stop, RoundStop) and stop.restitution is not None:
+        rigid = _NO_STOP._replace(
+            mobility=mobility, instant=options.instant(0.0), restitution=stop.restitution
+        )
+        return _around(rigid, stop, 0)
     row = StopRow(
         gap=stop.gap,
         stiffness=stop.stiffness,
@@ -66,11 +71,14 @@ def stop_row(
         instant=options.instant(0.0 if stop.dashpot else stop.exponent),
         release=-1.0 if stop.pulls else next(releases),
     )
-    if not isinstance(stop, RoundStop):
-        return row
+    return _around(row, stop, 0) if isinstance(stop, RoundStop) else row
+
+
+def _around(row: StopRow, stop: RoundStop, direction: int) -> StopRow:
+    """A row with the numbers of one direction of a round clearance."""
     return row._replace(
-        gap=stop.clearance,
-        centre=stop.eccentricity[0],
+        gap=stop.clearance if direction == 0 else row.gap,
+        centre=stop.eccentricity[direction],
         sense=stop.sense,
         rub=stop.friction,
         surface=stop.sliding_speed,
@@ -79,16 +87,13 @@ def stop_row(
 
 def second_row(stop: RoundStop, lead: int, mobility: float, options: FlowOptions) -> StopRow:
     """Numbers of the second direction of a round clearance as the engine takes them."""
-    return _NO_STOP._replace(
+    row = _NO_STOP._replace(
         mobility=mobility,
         exponent=stop.exponent,
         instant=options.instant(0.0 if stop.friction else stop.exponent),
         lead=float(lead),
-        centre=stop.eccentricity[1],
-        sense=stop.sense,
-        rub=stop.friction,
-        surface=stop.sliding_speed,
     )
+    return _around(row, stop, 1)
 
 
 def of_areas(system: System, rows: Sequence[StopRow]) -> list[StopRow]:

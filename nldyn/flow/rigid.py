@@ -22,20 +22,20 @@ def behind_rigid_stops(flow: FlowMap, states: Real) -> NDArray[np.bool_]:
     """Which of the states z (k, 2n) lie behind a rigid stop, where no motion can begin."""
     behind = np.zeros(len(states), dtype=bool)
     for i, stop in flow.system.rigid_stops.items():
-        row = flow.rows[i]
-        size = np.abs(states) @ np.abs(row) + stop.gap
-        behind |= states @ row - stop.gap > BEHIND * size
+        rows = flow.rows[flow.round_rows.get(i, [i])]
+        size = (np.abs(states) @ np.abs(rows).T).sum(axis=1) + stop.reach
+        behind |= flow.outputs_at(i, states) - stop.gap > BEHIND * size
     return behind
 
 
 def before_rigid_stops(flow: FlowMap, states: Real) -> Real:
     """States z (k, 2n), those behind rigid stops mirrored at them, or moved to the middle."""
     states = states.copy()
-    rigid = list(flow.system.rigid_stops)
+    rigid = [row for i in flow.system.rigid_stops for row in flow.round_rows.get(i, [i])]
     for i, stop in flow.system.rigid_stops.items():
-        row = flow.rows[i]
-        depth = np.maximum(states @ row - stop.gap, 0.0)
-        states -= 2.0 * depth[:, None] * row / (row @ row)
+        depth = np.maximum(flow.outputs_at(i, states) - stop.gap, 0.0)
+        rows = np.array([flow.output_row(i, state) for state in states]).reshape(states.shape)
+        states -= 2.0 * (depth / (rows * rows).sum(axis=1))[:, None] * rows
     behind = behind_rigid_stops(flow, states)
     if behind.any():
         across = np.linalg.pinv(flow.rows[rigid]) @ flow.rows[rigid]
@@ -51,11 +51,10 @@ def impacts_in_order(motion: Trajectory) -> list[tuple[int, float]]:
             for piece, speed in zip(hit.piece, hit.speed, strict=True)]  # fmt: skip
     several = {piece for piece, *_ in hits if sum(other == piece for other, *_ in hits) > 1}
     listed = [(stop, speed) for piece, stop, speed in hits if piece not in several]
-    stops = range(len(system.stops))
-    mobility, rates = flow.mobility(stops), flow.rate_rows[: len(stops)]
     for piece in several:
         before = states_before(motion, np.array([piece]))[0]
-        speeds = rates @ before
+        rates, columns = _closing(flow, before)
+        speeds, mobility = rates @ before, rates @ columns
         shut = [stop for other, stop, _ in hits if other == piece]
         while True:
             hit = max(shut, key=lambda stop: speeds[stop])
@@ -67,6 +66,17 @@ def impacts_in_order(motion: Trajectory) -> list[tuple[int, float]]:
             kick /= mobility[hit, hit]
             speeds = speeds - mobility[:, hit] * kick
     return listed
+
+
+def _closing(flow: FlowMap, state: Real) -> tuple[Real, Real]:
+    """Rows (n_stops, 2n) of the closing speeds at a state z, columns (2n, n_stops) of impulses."""
+    count = len(flow.system.stops)
+    rates, columns = flow.rate_rows[:count].copy(), flow.force_columns[:, :count].copy()
+    for i, rows in flow.round_rows.items():
+        ring = flow.system.round_stops[i]
+        out = ring.sense * flow.system.round_polar(ring, flow.to_modal(state[None])).normal[0]
+        rates[i], columns[:, i] = out @ flow.rate_rows[rows], flow.force_columns[:, rows] @ out
+    return rates, columns
 
 
 class Series(NamedTuple):
@@ -89,7 +99,7 @@ def series_to_rest(motion: Trajectory, stop: int, hits: RigidImpacts) -> Series:
 
     In a series the speeds fall. Its end may lie in the next period.
     """
-    rests = motion.record.depth[:, stop].any(axis=1)
+    rests = rests_in_pieces(motion, stop)
     follows, soft = np.zeros((2, hits.piece.size), dtype=bool)
     if not (rests.any() and follows.size):
         return Series(follows, soft)
@@ -112,8 +122,13 @@ def series_to_rest(motion: Trajectory, stop: int, hits: RigidImpacts) -> Series:
 
 def rests_on_rigid_stop(motion: Trajectory) -> bool:
     """Whether a body rests on a rigid stop for a while in a motion."""
-    rigid = list(motion.flow.system.rigid_stops)
-    return bool(rigid) and bool(motion.record.depth[:, rigid].any())
+    return any(rests_in_pieces(motion, stop).any() for stop in motion.flow.system.rigid_stops)
+
+
+def rests_in_pieces(motion: Trajectory, stop: int) -> NDArray[np.bool_]:
+    """Whether a body rests on a rigid stop in the pieces of a motion, (pieces,)."""
+    rows = motion.flow.round_rows.get(stop, [stop])
+    return np.asarray(motion.record.depth[:, rows].any(axis=(1, 2)))
 
 
 def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
@@ -125,10 +140,12 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
     flow, rec, omega = motion.flow, motion.record, motion.omega
     system, data = flow.system, flow._data
     forces = np.zeros((len(phases), len(system.stops)))
-    rigid = np.array(list(system.rigid_stops), dtype=np.intp)
+    rigid = np.array([i for i in system.rigid_stops if i not in system.round_stops], dtype=np.intp)
     piece = np.clip(np.searchsorted(rec.phase, phases, side="right") - 1, 0, None)
     rests = np.any(rec.depth[:, rigid] != 0.0, axis=2)[piece]
-    if not rests.any():
+    rings = {i: rests_in_pieces(motion, i)[piece] for i in system.rigid_stops if i not in rigid}
+    resting = np.flatnonzero(np.any([*rests.T, *rings.values(), 0.0 * phases], axis=0))
+    if not resting.size:
         return forces
     turns = np.exp(1j * phases[:, None] * data.orders)
     rates = (turns @ (np.array([1.0, omega, omega * omega]) @ data.drive)).real
@@ -136,7 +153,13 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
         order = np.argsort(phases, kind="stable")
         states = states.copy()
         states[order] = motion.states(phases[order])
-    modal, around = flow.to_modal(states), []
+    modal, around, on_rings = flow.to_modal(states), [], []
+    for i, on in rings.items():
+        ring, (_, across, stuck) = system.round_stops[i], round_friction(motion, i)
+        at, sticks = system.round_polar(ring, modal), stuck[piece] & on
+        share = np.where(sticks, 0.0, ring.friction * np.sign(across.sum(axis=1)[piece]))
+        on_rings.append((on, i, at, share))
+        around.append((sticks, ring, at, flow.round_rows[i]))
     for i, stop in system.elastic_stops.items():
         pushed = stop.force(*system.depth_and_speed(stop, modal))
         if isinstance(stop, RoundStop):
@@ -181,8 +204,12 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
     acting = np.r_[rigid, first : first + len(system.sliders)]
     rows = flow.rate_rows[acting]
     pace = states @ data.rows[2, acting].T + rates @ rows.T
-    for k in np.flatnonzero(rests.any(axis=1)).tolist():
+    for k in resting.tolist():
+        pressed = [(i, at, share) for on, i, at, share in on_rings if on[k]]
         more = [
+            _held_outward(flow, i, at, float(share[k]), k, states[k], rates[k])
+            for i, at, share in pressed
+        ] + [
             _held_across(flow, stop, at, plane, k, states[k], rates[k])
             for sticks, stop, at, plane in around
             if sticks[k]
@@ -198,7 +225,23 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
         paces = np.r_[pace[k], [each for _, _, each in more]]
         found = np.linalg.solve(taken[np.ix_(held, held)], paces[held])
         forces[k, rigid[held[held < rigid.size]]] = found[held < rigid.size]
+        forces[k, [i for i, *_ in pressed]] = found[len(found) - len(more) :][: len(pressed)]
     return forces
+
+
+def _held_outward(
+    flow: FlowMap, number: int, at: Polar, share: float, k: int, state: Real, rate: Real
+) -> tuple[Real, Real, float]:
+    """How a state z moves along the radius where it rests in a rigid round clearance, at place k.
+
+    As `_held_across`; friction takes a share of the force.
+    """
+    ring, plane = flow.system.round_stops[number], flow.round_rows[number]
+    out, whirl = ring.sense * at.normal[k], at.sliding[k] - ring.sliding_speed
+    row = out @ flow.rate_rows[plane]
+    column = flow.force_columns[:, plane] @ (out + share * at.across[k])
+    pace = state @ (out @ flow._data.rows[2, plane]) + rate @ row
+    return row, column, float(pace + ring.sense * whirl**2 / at.radius[k])
 
 
 def _held_across(

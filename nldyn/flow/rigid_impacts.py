@@ -17,6 +17,50 @@ STILL = 1e-9  # of the largest speed at a stop: one that counts as none
 ROUNDED = 1e-9  # of the slip before an impact: one behind it that is none
 
 
+class Course(NamedTuple):
+    """What states tell of a rigid stop.
+
+    Parameters
+    ----------
+    depth, closing, slip : (k,)
+        Penetration in m, its rate, and the speed of sliding in m/s, which is zero without friction.
+    mobility : (k, 2, 2)
+        Speeds of closing and sliding that unit impulses along the normal and of friction take.
+    """
+
+    depth: Real
+    closing: Real
+    slip: Real
+    mobility: Real
+
+
+def course(flow: FlowMap, stop: int, states: Real) -> Course:
+    """What states z (k, 2n) tell of a rigid stop."""
+    depth, closing = flow.system.depth_and_speed(flow.system.stops[stop], flow.to_modal(states))
+    ring, slip = flow.system.round_stops.get(stop), np.zeros(len(states))
+    if ring is not None:
+        at = flow.system.round_polar(ring, flow.to_modal(states))
+        ways = np.stack([ring.sense * at.normal, at.across], axis=1)
+        mobility = ways @ flow.mobility(flow.round_rows[stop]) @ np.swapaxes(ways, 1, 2)
+        return Course(depth, closing, at.sliding if ring.friction else slip, mobility)
+    number = slider_of(flow.system, stop)
+    rows = [stop, stop]
+    if number is not None:
+        rows[1] = len(flow.system.stops) + number
+        belt = flow.system.sliders[number].friction.base_speeds[0]
+        slip = states @ flow.rate_rows[rows[1]] - belt
+    mobility = np.broadcast_to(flow.mobility(rows), (len(states), 2, 2))
+    return Course(depth, closing, slip, np.asarray(mobility))
+
+
+def friction_at(system: System, stop: int) -> float | None:
+    """Coefficient of friction at a rigid stop; None where there is none."""
+    ring, number = system.round_stops.get(stop), slider_of(system, stop)
+    if ring is not None:
+        return ring.friction or None
+    return None if number is None else system.sliders[number].friction.coefficient
+
+
 class RigidImpacts(NamedTuple):
     """Impacts with a rigid stop, in the order of time.
 
@@ -34,6 +78,8 @@ class RigidImpacts(NamedTuple):
         Those of friction, in the sense in which `slip` counts; zero without any.
     slip, slip_behind : (k,)
         Speeds in m/s of sliding before and after; zero without friction.
+    mobility : (k, 2, 2)
+        As of a `Course`.
     """
 
     piece: NDArray[np.intp]
@@ -44,6 +90,7 @@ class RigidImpacts(NamedTuple):
     rub: Real
     slip: Real
     slip_behind: Real
+    mobility: Real
 
     @property
     def loss(self) -> Real:
@@ -68,23 +115,29 @@ def rigid_impacts(motion: Trajectory, stop: int) -> RigidImpacts:
     flow, rec = motion.flow, motion.record
     after = 1 + np.flatnonzero(np.isin(rec.event[:-1], list(flow.system.rigid_stops)))
     if not after.size:
-        return RigidImpacts(after, *np.empty((7, 0)))
-    before = states_before(motion, after)
-    row, rate = flow.rows[stop], flow.rate_rows[stop]
-    gap = flow.system.stops[stop].gap
-    depth = rec.start[after] @ row - gap
-    speed, rebound = before @ rate, -(rec.start[after] @ rate)
-    size = (np.abs(rec.start) @ np.abs(row)).max() + gap
-    size += motion.flow.response(motion.omega).size(motion.omega) * np.abs(row).sum()
-    fastest = max(np.abs(rec.start @ rate).max(), np.abs(speed).max())
-    hit = (np.abs(depth) <= SHUT * size) & (speed > STILL * fastest)
+        none = np.empty(0)
+        return RigidImpacts(
+            after, none, none, none, none, none, none, none, np.empty((0, 2, 2))
+        )
+    before, behind = (
+        course(flow, stop, states) for states in (states_before(motion, after), rec.start[after])
+    )
+    rows = flow.round_rows.get(stop, [stop])
+    seen, rates = np.abs(flow.rows[rows]).sum(axis=0), rec.start @ flow.rate_rows[rows].T
+    size = (np.abs(rec.start) @ seen).max() + flow.system.rigid_stops[stop].reach
+    size += motion.flow.response(motion.omega).size(motion.omega) * seen.sum()
+    fastest = max(np.linalg.norm(rates, axis=1).max(), np.abs(before.closing).max())
+    speed, rebound = before.closing, -behind.closing
+    hit = (np.abs(behind.depth) <= SHUT * size) & (speed > STILL * fastest)
     hit &= speed + rebound > STILL * speed
-    impulses, slips = _impulses(
-        flow, stop, speed[hit] + rebound[hit], before[hit], rec.start[after[hit]]
-    )
+    impulse, rub, slip, slip_behind = _impulses(
+        friction_at(flow.system, stop), Course(*(each[hit] for each in before)),
+        Course(*(each[hit] for each in behind)),
+    )  # fmt: skip
     return RigidImpacts(
-        after[hit], rec.phase[after[hit]], speed[hit], rebound[hit], *impulses, *slips
-    )
+        after[hit], rec.phase[after[hit]], speed[hit], rebound[hit], impulse, rub, slip,
+        slip_behind, before.mobility[hit],
+    )  # fmt: skip
 
 
 def slider_of(system: System, stop: int) -> int | None:
@@ -94,45 +147,34 @@ def slider_of(system: System, stop: int) -> int | None:
 
 
 def _impulses(
-    flow: FlowMap, stop: int, jump: Real, before: Real, behind: Real
-) -> tuple[Real, Real]:
-    """Impulses (2, k) along the normal and of friction, and speeds (2, k) of sliding.
-
-    By the jump (k,) of the speed of closing, and the states z (k, 2n) before and behind.
-    """
-    number = slider_of(flow.system, stop)
-    if number is None:
+    coefficient: float | None, before: Course, behind: Course
+) -> tuple[Real, Real, Real, Real]:
+    """Impulses (k,) along the normal and of friction, and speeds (k,) of sliding at both ends."""
+    jump = before.closing - behind.closing
+    if coefficient is None:
         none = np.zeros(jump.shape)
-        return np.array([jump / flow.mobility([stop])[0, 0], none]), np.array([none, none])
-    row = flow.rate_rows[len(flow.system.stops) + number]
-    belt = flow.system.sliders[number].friction.base_speeds[0]
-    slips = np.array([states @ row - belt for states in (before, behind)])
-    jumps = np.array([jump, slips[0] - slips[1]])
-    return np.linalg.solve(_mobility(flow, stop, number), jumps), slips
+        return jump / before.mobility[:, 0, 0], none, none, none
+    jumps = np.stack([jump, before.slip - behind.slip], axis=1)
+    impulse, rub = np.linalg.solve(before.mobility, jumps[:, :, None])[:, :, 0].T
+    return impulse, rub, before.slip, behind.slip
 
 
-def _mobility(flow: FlowMap, stop: int, number: int) -> Real:
-    """Speeds (2, 2) of closing and sliding that impulses along the normal and of friction take."""
-    return flow.mobility([stop, len(flow.system.stops) + number])
-
-
-def _turns(flow: FlowMap, number: int, hits: RigidImpacts) -> Real:
+def _turns(coefficient: float, hits: RigidImpacts) -> Real:
     """Normal impulses (k,) in N s at which sliding comes to rest or turns, or those at the end."""
-    slider = flow.system.sliders[number]
-    (_, both), (_, along) = _mobility(flow, slider.stop, number)
-    sense, mu = np.sign(hits.slip), slider.friction.coefficient
+    both, along = hits.mobility[:, 1].T
+    sense = np.sign(hits.slip)
     turns = sense * hits.slip_behind <= ROUNDED * np.abs(hits.slip)
-    slowed = np.where(turns & (sense != 0.0), sense * both + mu * along, 1.0)
+    slowed = np.where(turns & (sense != 0.0), sense * both + coefficient * along, 1.0)
     return np.where(turns, np.abs(hits.slip) / slowed, hits.impulse)
 
 
-def rubbed(flow: FlowMap, number: int, hits: RigidImpacts) -> Real:
-    """Integrals (k,) in N m of the sliding speed over the normal impulse, in impacts of a slider.
+def rubbed(coefficient: float, hits: RigidImpacts) -> Real:
+    """Integrals (k,) in N m of the sliding speed over the normal impulse, in impacts with friction.
 
     Sliding slows to rest at an instant of the impact, if it does; then it sticks, or slides back
     ever faster. Times μ that is what friction takes.
     """
-    turn = _turns(flow, number, hits)
+    turn = _turns(coefficient, hits)
     before, behind = np.abs(hits.slip), np.abs(hits.slip_behind)
     way = before * turn + behind * (hits.impulse - turn)
     way[turn == hits.impulse] += (behind * hits.impulse)[turn == hits.impulse]
@@ -141,23 +183,20 @@ def rubbed(flow: FlowMap, number: int, hits: RigidImpacts) -> Real:
 
 def normal_losses(flow: FlowMap, stop: int, hits: RigidImpacts) -> Real:
     """Energies (k,) in J that impacts take along the normal."""
-    number = slider_of(flow.system, stop)
-    if number is None:
-        return hits.loss
-    coefficient = flow.system.sliders[number].friction.coefficient
-    return hits.loss - coefficient * rubbed(flow, number, hits)
+    coefficient = friction_at(flow.system, stop)
+    return hits.loss if coefficient is None else hits.loss - coefficient * rubbed(coefficient, hits)
 
 
 def compression_works(flow: FlowMap, stop: int, hits: RigidImpacts) -> Real:
     """Work (k,) in J done against a rigid stop until its gap closes no more."""
-    number, of = slider_of(flow.system, stop), flow.system.rigid_stops[stop]
+    coefficient, of = friction_at(flow.system, stop), flow.system.rigid_stops[stop]
     e = np.array([of.restitution_at(speed) for speed in hits.speed.tolist()])
     ends = hits.impulse / (1.0 + np.where(hits.rebound > STILL * hits.speed, e, 0.0))
     work = 0.5 * ends * hits.speed
-    if number is None:
+    if coefficient is None:
         return work
-    (own, both), _ = _mobility(flow, stop, number)
-    turn = _turns(flow, number, hits)
-    share = np.sign(hits.slip) * flow.system.sliders[number].friction.coefficient
+    own, both = hits.mobility[:, 0].T
+    turn = _turns(coefficient, hits)
+    share = np.sign(hits.slip) * coefficient
     kink = hits.speed - (own + share * both) * turn
     return np.where(turn < ends, 0.5 * (turn * hits.speed + ends * kink), work)

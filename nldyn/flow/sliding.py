@@ -139,12 +139,17 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
     loss = float((force[slides] * moved).sum())
     pressed_distance = float(np.abs(pressed * moved).sum())
     if slider.stop in flow.system.rigid_stops:
-        in_impacts = float(rubbed(flow, number, rigid_impacts(motion, slider.stop)).sum())
+        pressed_distance += (in_impacts := _rubbed_in_impacts(motion, slider))
         loss += slider.friction.coefficient * in_impacts
-        pressed_distance += in_impacts
     forces = force @ fine_table(tables.nodes.size).T
     largest, way = peaks(np.abs(forces)), float(np.abs(ways[slides]).sum())
     return _measures(motion, slider, largest, way, duration, slides, loss, pressed_distance)
+
+
+def _rubbed_in_impacts(motion: Trajectory, slider: Slider) -> float:
+    """Integral in N m of the sliding speed over the impulses of a rigid stop."""
+    hits = rigid_impacts(motion, slider.stop)
+    return float(rubbed(slider.friction.coefficient, hits).sum())
 
 
 def _plane_measures(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
@@ -199,8 +204,8 @@ def _times_of_nodes(motion: Trajectory, panels: NDArray[np.intp]) -> Real:
 
 def _touching(motion: Trajectory, stop: int) -> NDArray[np.intp]:
     """The panels in which a stop is closed."""
-    panels = np.flatnonzero(motion.record.kind >= 0)
-    return np.asarray(panels[motion.record.depth[panels, stop].any(axis=1)])
+    panels, rows = np.flatnonzero(motion.record.kind >= 0), motion.flow.round_rows.get(stop, [stop])
+    return np.asarray(panels[motion.record.depth[panels][:, rows].any(axis=(1, 2))])
 
 
 def _round_measures(motion: Trajectory, ring: Slider, ends: Real) -> SliderMeasures:
@@ -220,6 +225,8 @@ def _round_measures(motion: Trajectory, ring: Slider, ends: Real) -> SliderMeasu
     way[sticks] = 0.0
     forces = np.abs(across @ fine_table(flow.tables.nodes.size).T)
     pressed_distance = float((pressed * way).sum())
+    if stop.impulsive and stop.friction:
+        pressed_distance += _rubbed_in_impacts(motion, ring)
     loss = ring.friction.coefficient * pressed_distance
     total, closed = float(way.sum()), rec.duration[panels]
     return _measures(motion, ring, peaks(forces), total, closed, ~sticks, loss, pressed_distance)
@@ -270,9 +277,11 @@ def round_friction(motion: Trajectory, stop: int) -> tuple[Real, Real, NDArray[n
 
 
 def slides_one_way(motion: Trajectory) -> bool:
-    """Whether what rubs in round clearances slides the same way all the time."""
+    """Whether what rubs in round clearances slides the same way all the time, without impacts."""
     for number, stop in motion.flow.system.round_stops.items():
         if stop.friction:
+            if stop.impulsive:
+                return False
             _, across, sticks = round_friction(motion, number)
             ways = np.sign(across[_touching(motion, number)].sum(axis=1))
             if sticks.any() or np.unique(ways).size > 1:

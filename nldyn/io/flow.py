@@ -321,7 +321,7 @@ def _coefficients(spring: AnySpring) -> list[float]:
 
 def _write_rigid_stops(group: Any, system: System) -> None:
     """Write the rigid stops, if there are some, with their places among all."""
-    placed = system.rigid_stops
+    placed = {i: s for i, s in enumerate(system.stops) if isinstance(s, RigidStop)}
     if not placed:
         return
     stops = list(placed.values())

@@ -18,6 +18,7 @@ from nldyn.flow.flow_map import SHALLOW, FlowError, FlowMap, Solution, Trajector
 from nldyn.flow.rigid import (
     impacts_in_order,
     rest_forces,
+    rests_in_pieces,
     rests_on_rigid_stop,
     series_to_rest,
 )
@@ -448,7 +449,7 @@ class Orbit:
     def _rests(self, stop: int, phases: Real) -> NDArray[np.bool_]:
         """Whether the gap of a rigid stop stays shut at or beside phases: it has no extremes."""
         record = self.trajectory.record
-        rests = np.asarray(record.depth[:, stop].any(axis=1))
+        rests = rests_in_pieces(self.trajectory, stop)
         found = np.zeros(phases.size, dtype=bool)
         for near in (phases - LIFTS_OFF, phases, phases + SAME_PHASE):
             piece = np.searchsorted(record.phase, near, side="right") - 1

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -83,7 +83,7 @@ def opened(flow: FlowMap, left_out: Collection[int], size: float) -> FlowMap:
     for stop in left_out:
         reach = size * max(float(np.linalg.norm(flow.rows[stop])), 1.0)
         left = flow.system.rigid_stops[stop]
-        stops[stop] = replace(left, gap=OUT_OF_REACH * (left.gap + reach))
+        stops[stop] = left.out_of_reach(OUT_OF_REACH * (abs(left.gap) + reach))
     return FlowMap(flow.system.with_elements(stops=tuple(stops)), flow.options)
 
 

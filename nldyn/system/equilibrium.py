@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from nldyn.base.arrays import SLACK, TINY, Complex, Real
 from nldyn.base.errors import SystemModelError
 from nldyn.system.contact_law import power_law
-from nldyn.system.rigid_stop import AnyStop, RigidStop
+from nldyn.system.rigid_stop import AnyStop
 from nldyn.system.round_stop import Polar, RoundStop
 from nldyn.system.springs_dampers import Bond
 from nldyn.system.stop import Stop
@@ -247,13 +248,16 @@ def with_springs_for_rigid_stops(system: System) -> System:
     push = float(np.linalg.norm(constant_force(system)))
     stops: list[AnyStop] = []
     for stop in system.stops:
-        if isinstance(stop, RigidStop):
+        if stop.impulsive:
             c = float(np.linalg.norm(system.stop_vector(stop)))
             pace = float(system.natural_frequencies.max()) ** 2 / (c * c or 1.0)
             stiffness = RIGID * (pace or c * push or 1.0)
-            stop = Stop.linear(
-                stop.at, stiffness, gap=stop.gap, direction=stop.direction, against=stop.against
-            )
+            if isinstance(stop, RoundStop):
+                stop = replace(stop, stiffness=stiffness, exponent=1.0, restitution=None)
+            else:
+                stop = Stop.linear(
+                    stop.at, stiffness, gap=stop.gap, direction=stop.direction, against=stop.against
+                )
         stops.append(stop)
     return system.with_elements(stops=tuple(stops))
 

@@ -100,7 +100,8 @@ def check_exact(system: System, parameter: Parameter) -> None:
         check_index(parameter, "stop", len(system.stops))
         stop = system.stops[index]
         around = isinstance(stop, RoundStop)
-        if not hasattr(stop, name) or (around and name not in SHARED):
+        of_ring = ("restitution",) if stop.impulsive else SHARED
+        if not hasattr(stop, name) or (around and name not in of_ring):
             kind = "rigid" if stop.impulsive else "a round clearance" if around else "elastic"
             raise SystemModelError(f"parameter '{name}': stops[{index}] is {kind}, without {name}")
         if name != "gap" and stop.law is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import ClassVar
 
@@ -107,6 +107,15 @@ class RigidStop:
         ends = (self.tangent, self.tangent_against)
         law = check_tangent(owner, self.at, ends, self.friction)
         object.__setattr__(self, "friction", law)
+
+    @property
+    def reach(self) -> float:
+        """Displacement in m of the size of those with which it is touched."""
+        return self.gap
+
+    def out_of_reach(self, size: float) -> RigidStop:
+        """The same where what moves no farther than `size` from rest does not hit it."""
+        return replace(self, gap=self.gap + size)
 
     @property
     def law(self) -> ContactLaw | None:

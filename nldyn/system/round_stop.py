@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, NamedTuple
@@ -10,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import SystemModelError, check_types, shown
+from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.system.contact_law import ContactLaw
 from nldyn.system.stop import Stop
 from nldyn.system.values import check_finite, check_not_negative, check_positive
 
 _CENTRES = ("first_eccentricity", "second_eccentricity")
 _NUMBERS = ("stiffness", "clearance", "exponent", "dissipation", "friction")
+_OF_ELASTIC = {"exponent": 1.5, "dissipation": 0.0, "law": None}  # and what a rigid one leaves them
 
 
 class Polar(NamedTuple):
@@ -60,12 +62,16 @@ class RoundStop:
     body slides: by its whirl, and by its turning, where it turns. Where that speed is zero it
     sticks, without giving way, as long as that takes no more than :math:`\mu N`: it rolls.
 
+    `rigid` makes one that does not give way: there velocities jump as at a `RigidStop`, along the
+    radius, and a body rests on it under the force that keeps it at :math:`|r - e| = c` until that
+    would have to pull.
+
     Parameters
     ----------
     plane : (str, str)
         Interfaces of the place: its displacements along two perpendicular directions.
     stiffness : float
-        k in N/m^p.
+        k in N/m^p; infinite of a rigid one.
     clearance : float
         c in m, above 0.
     exponent : float
@@ -85,6 +91,8 @@ class RoundStop:
     surface_speed : float, optional
         Speed in m/s of the surface that turns, ΩR of a rotor, needed where there is friction;
         positive if the body turns from the first direction to the second, 0 if it does not turn.
+    restitution : float, optional
+        Coefficient e from 0 to 1 of a rigid one.
 
     Raises
     ------
@@ -109,7 +117,7 @@ class RoundStop:
     law: ContactLaw | None = None
     friction: float = 0.0
     surface_speed: float | None = None
-    impulsive: ClassVar[bool] = False
+    restitution: float | None = None
     dashpot: ClassVar[float] = 0.0
     pulls: ClassVar[bool] = True
     direction: ClassVar[int] = 1
@@ -144,10 +152,86 @@ class RoundStop:
                 f"{owner}: friction needs the surface_speed of what turns, which is 0 of a body "
                 "that does not turn"
             )
-        _ = self.normal
         object.__setattr__(self, "inside", bool(self.inside))
+        if self.restitution is None:
+            _ = self.normal
+        else:
+            self._check_rigid(owner)
         for name in _NUMBERS:
             object.__setattr__(self, name, float(getattr(self, name)))
+
+    def _check_rigid(self, owner: str) -> None:
+        if not (is_finite(self.restitution) and 0.0 <= (self.restitution or 0.0) <= 1.0):
+            raise SystemModelError(
+                f"{owner}: restitution must lie between 0 and 1, got {shown(self.restitution)}"
+            )
+        given = [name for name, none in _OF_ELASTIC.items() if getattr(self, name) != none]
+        if self.stiffness != math.inf or given:
+            name = given[0] if given else "stiffness"
+            raise SystemModelError(f"{owner}: give either a restitution, if it is rigid, or {name}")
+        object.__setattr__(self, "restitution", float(self.restitution or 0.0))
+        if self.room < 0.0:
+            raise SystemModelError(
+                f"{owner}: the place at rest lies {-self.room:g} m behind it, and it is rigid: "
+                "change clearance or eccentricity"
+            )
+
+    @classmethod
+    def rigid(
+        cls,
+        plane: tuple[str, str],
+        restitution: float,
+        clearance: float,
+        *,
+        eccentricity: tuple[float, float] = (0.0, 0.0),
+        inside: bool = True,
+        against_plane: tuple[str, str] | None = None,
+        friction: float = 0.0,
+        surface_speed: float | None = None,
+    ) -> RoundStop:
+        """One that does not give way: impacts along the radius, and rest.
+
+        Parameters
+        ----------
+        plane, clearance, eccentricity, inside, against_plane, friction, surface_speed
+            As for `RoundStop`.
+        restitution : float
+            Coefficient e, from 0 to 1: what closes at v opens at e v.
+
+        Examples
+        --------
+        >>> RoundStop.rigid(("x", "y"), 0.8, 1e-3).impulsive
+        True
+        """
+        return cls(
+            plane, math.inf, clearance, eccentricity=eccentricity, inside=inside,
+            against_plane=against_plane, friction=friction, surface_speed=surface_speed,
+            restitution=restitution,
+        )  # fmt: skip
+
+    @property
+    def impulsive(self) -> bool:
+        """Whether it is rigid: velocities jump where it is hit."""
+        return self.restitution is not None
+
+    def restitution_at(self, speed: float) -> float:
+        """Coefficient of restitution of a rigid one, the same at all impact speeds in m/s."""
+        return self.restitution or 0.0
+
+    def determinant(self, speed: float) -> float:
+        """Factor e² by which an impact at a speed changes volumes of states."""
+        return self.restitution_at(speed) ** 2
+
+    @property
+    def reach(self) -> float:
+        """Displacement in m of the size of those with which it is touched."""
+        return self.clearance + float(np.hypot(*self.eccentricity))
+
+    def out_of_reach(self, size: float) -> RoundStop:
+        """The same where what moves no farther than `size` from rest does not hit it."""
+        if self.inside:
+            return replace(self, clearance=self.clearance + size)
+        return replace(self, eccentricity=(self.clearance + size + abs(self.eccentricity[0]), 0.0))
 
     @cached_property
     def normal(self) -> Stop:
@@ -204,22 +288,24 @@ class RoundStop:
 
     @property
     def jumps(self) -> bool:
-        """Whether its force may jump: friction does where the surface turns."""
-        return self.friction > 0.0
+        """Whether a force or velocity may jump: friction does where the surface turns."""
+        return self.friction > 0.0 or self.impulsive
 
     @property
     def is_linear(self) -> bool:
         """Whether the normal force goes with the penetration."""
-        return self.normal.is_linear
+        return not self.impulsive and self.normal.is_linear
 
     @property
     def sharp(self) -> bool:
         """Whether it is so stiff from the first touch that multipliers have no slope there."""
-        return self.normal.sharp
+        return self.impulsive or self.normal.sharp
 
     @property
     def depends_on_speed(self) -> bool:
-        """Whether the normal force may depend on the speed of penetration."""
+        """Whether the normal force may depend on the speed, or an impact takes energy out."""
+        if self.impulsive:
+            return self.restitution != 1.0
         return self.normal.depends_on_speed
 
     @property

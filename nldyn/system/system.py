@@ -598,7 +598,11 @@ class System:
     @cached_property
     def elastic_stops(self) -> dict[int, Stop | RoundStop]:
         """The stops that give way, by their places among all."""
-        return {i: s for i, s in enumerate(self.stops) if isinstance(s, Stop | RoundStop)}
+        return {
+            i: s
+            for i, s in enumerate(self.stops)
+            if isinstance(s, Stop | RoundStop) and not s.impulsive
+        }
 
     @cached_property
     def areas(self) -> dict[str, tuple[int, ...]]:
@@ -637,9 +641,13 @@ class System:
         return {i: stop for i, stop in enumerate(self.stops) if isinstance(stop, RoundStop)}
 
     @cached_property
-    def rigid_stops(self) -> dict[int, RigidStop]:
+    def rigid_stops(self) -> dict[int, RigidStop | RoundStop]:
         """The stops at which velocities jump, by their places among all."""
-        return {i: stop for i, stop in enumerate(self.stops) if isinstance(stop, RigidStop)}
+        return {
+            i: s
+            for i, s in enumerate(self.stops)
+            if isinstance(s, RigidStop) or (isinstance(s, RoundStop) and s.impulsive)
+        }
 
     @cached_property
     def coupled(self) -> CoupledStops:
@@ -1029,6 +1037,9 @@ class System:
                     f"the {self.size} modes both tangents are one motion, or none"
                 )
         for stop in self.rigid_stops.values():
+            if isinstance(stop, RoundStop):
+                self._check_rigid_ring(stop)
+                continue
             if not isinstance(stop.friction, Friction) or stop.tangent is None:
                 continue
             if stop.friction.adhesion:
@@ -1057,6 +1068,24 @@ class System:
                     f"friction at {names} acts on motions that are not independent in {self.size} "
                     "modes, so that nothing tells what each holds where they stick: merge them, or "
                     "keep more modes"
+                )
+
+    def _check_rigid_ring(self, ring: RoundStop) -> None:
+        """Refuse what holds the same motion as a rigid round clearance does."""
+        rows = self.stop_vectors(ring)
+        if _rank(rows, self.size) < 2:
+            x, y = ring.plane
+            raise SystemModelError(
+                f"the rigid round clearance at '{x}', '{y}' needs a motion all around: in the "
+                f"{self.size} modes both are one motion, or none"
+            )
+        for other in self.sliders:
+            along = self.vector_between(other.at, other.against)
+            if other.tangential_stiffness is None and _rank([*rows, along], self.size) < 3:
+                raise SystemModelError(
+                    f"friction at '{other.at}' and the rigid round clearance at "
+                    f"'{ring.plane[0]}' would hold one motion, so that nothing tells what each "
+                    "takes: give the friction a tangential_stiffness, or the clearance a stiffness"
                 )
 
     def _sliders_at_once(self) -> Iterator[list[Slider]]:

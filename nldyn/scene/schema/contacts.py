@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
@@ -188,10 +189,12 @@ class RoundClearanceTable(Table):
     clearance: Positive
     """[m] Radial clearance, above 0: how far the place may move from the centre of a ring, or how
     near it may come to that of a pin."""
-    stiffness: Positive
-    """[N/m^exponent] Stiffness of the contact, above 0."""
-    law: Literal["hertz", "linear"] = "hertz"
-    """`"hertz"`, or `"linear"` for a spring."""
+    stiffness: Positive | None = None
+    """[N/m^exponent] Stiffness of the contact, above 0; none of the law `"rigid"`."""
+    law: Literal["hertz", "linear", "rigid"] = "hertz"
+    """`"hertz"`, `"linear"` for a spring, or `"rigid"` for impacts that take no time."""
+    restitution: Annotated[float, Field(ge=0, le=1)] | None = None
+    """Coefficient of restitution from 0 to 1 of the law `"rigid"`, which needs it."""
     exponent: Annotated[float, Field(ge=1, le=LARGEST_EXPONENT)] | None = None
     """Exponent of the law `"hertz"`, from 1 to 4; 1.5 unless given."""
     eccentricity: Annotated[list[Number], Field(min_length=2, max_length=2)] = [0.0, 0.0]
@@ -214,6 +217,14 @@ class RoundClearanceTable(Table):
             raise ValueError("needs two different interfaces in 'plane'")
         if self.against is not None and set(self.against) & set(self.plane):
             raise ValueError("needs other interfaces than its own in 'against'")
+        if self.law == "rigid":
+            refuse(self, ("stiffness", "exponent", "dissipation"), "law 'rigid'")
+            if self.restitution is None:
+                raise ValueError("needs a 'restitution' for law 'rigid'")
+        elif self.restitution is not None:
+            raise ValueError("has 'restitution', which is for law 'rigid'")
+        elif self.stiffness is None:
+            raise ValueError("needs a 'stiffness', or the law 'rigid'")
         if self.law == "linear":
             refuse(self, ("exponent",), "law 'linear'")
         if self.friction and self.surface_speed is None:
@@ -230,10 +241,12 @@ class RoundClearanceTable(Table):
     def made(self) -> RoundStop:
         """The round stop."""
         against = None if self.against is None else (self.against[0], self.against[1])
+        rigid, stiffness = self.stiffness is None, self.stiffness or math.inf
         return RoundStop(
-            (self.plane[0], self.plane[1]), self.stiffness, self.clearance, exponent_of(self),
-            (self.eccentricity[0], self.eccentricity[1]), self.inside, against, self.dissipation,
-            friction=self.friction, surface_speed=self.surface_speed,
+            (self.plane[0], self.plane[1]), stiffness, self.clearance,
+            1.5 if rigid else exponent_of(self), (self.eccentricity[0], self.eccentricity[1]),
+            self.inside, against, self.dissipation, friction=self.friction,
+            surface_speed=self.surface_speed, restitution=self.restitution,
         )  # fmt: skip
 
 
