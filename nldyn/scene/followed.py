@@ -22,7 +22,7 @@ OF_LISTS = {  # the keys of each list of tables that may change
     "excitation": SOURCES,
     "dampers": ("coefficient",),
     "friction": ("coefficient", "normal_force", "tangential_stiffness", "base_speed"),
-    "round_clearances": (*SHARED, "clearance", "friction", "eccentricity"),
+    "round_clearances": (*SHARED, "restitution", "clearance", "friction", "eccentricity"),
     "contact_areas": ("gap", "stiffness", "friction"),
     "springs": ("stiffness", "coefficients"),
 }

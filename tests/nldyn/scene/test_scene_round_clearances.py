@@ -63,6 +63,20 @@ def test_all_keys_are_taken(tmp_path):
     )  # fmt: skip
 
 
+RIGID = ('law = "linear"', 'law = "rigid"\nrestitution = 0.6')
+
+
+def test_one_may_be_rigid(tmp_path):
+    scene = scene_of(tmp_path, ("stiffness = 2e6\n", ""), RIGID)
+    ring = build_system(scene).stops[0]
+    assert ring == RoundStop.rigid(("x", "y"), 0.6, 6e-4, friction=0.08, surface_speed=5.0)
+    assert describe_stop(ring).startswith("rigid ring around 'x', 'y': restitution 0.6, clearance")
+    followed = ("range_hz = [24.0, 42.0]", 'frequency_hz = 30.0\nrange = [0.1, 0.9]\n'
+                'parameter = "round_clearances.0.restitution"')  # fmt: skip
+    scene = scene_of(tmp_path, ("stiffness = 2e6\n", ""), RIGID, followed)
+    assert followed_parameter(scene) == Parameter("restitution", 0)
+
+
 @pytest.mark.parametrize(
     ("key", "parameter"),
     [
@@ -88,6 +102,10 @@ def test_its_numbers_may_change(tmp_path, key, parameter):
         (("surface_speed = 5.0", ""), "surface_speed"),
         (("friction = 0.08", ""), "which needs a 'friction'"),
         (('law = "linear"', 'law = "linear"\nexponent = 2.0'), "exponent"),
+        (RIGID, "stiffness.*law 'rigid'"),
+        (('law = "linear"', 'law = "rigid"'), "stiffness.*law 'rigid'"),
+        (('law = "linear"', 'restitution = 0.5'), "which is for law 'rigid'"),
+        (("stiffness = 2e6", ""), "needs a 'stiffness', or the law 'rigid'"),
         (('law = "linear"', 'law = "linear"\ngap = 2.0'), "gap"),
     ],
 )
