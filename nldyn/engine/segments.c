@@ -5,25 +5,43 @@
 
 #define GOES_ON (-1) /* no outcome yet */
 
+/* fill `held` (n_stops,) with the forces that hold sliders, or nan where none does */
+static void fill_held(const Motion *M, double phase, double *held)
+{
+    bool any = any_sticks(M);
+    if (any) contact_forces(M, phase);
+    for (int s = 0; s < M->fl->n_stops; s++)
+        held[s] = any && is_stuck(M, s) && is_slider(M->fl, s) ? M->s->stop_forces[s] : NAN;
+}
+
 /* Change of the sensitivities as a dashpot begins or ceases to act, a time t after the start.
  *
  * The force jumps by c δ', and the switch moves by -dδ/δ' with the penetration there: together
- * they change the velocities by c dδ [Aizerman and Gantmacher 1958]. */
-static void jump_columns(Motion *M, int stop, double phase, double t, bool closes)
+ * they change the velocities by c dδ [Aizerman and Gantmacher 1958]. So do those of sliders that it
+ * presses on, or that slip as it was more than their friction: they `held` that much before. What is
+ * held on takes its share of the impulse. */
+static void jump_columns(Motion *M, int stop, double phase, double t, bool closes,
+                         const double *held)
 {
     const Flow *fl = M->fl;
-    double *depth = M->s->moved, dashpot = stop_of(fl, stop)->dashpot;
+    double *depth = M->s->moved, *shift = M->s->moved_shift, dashpot = stop_of(fl, stop)->dashpot;
+    double speed = output_now(fl, stop, M->w, phase).first;
     depth_columns(M, stop, phase, t, depth);
-    double impulse = closes ? -dashpot : dashpot;
-    for (int s = stop; s < fl->n_stops; s++) {
-        bool slides = is_pressed(fl, s) && (int)stop_of(fl, s)->normal == stop;
-        if (s != stop && !(slides && fl->slides[s] != 0)) continue;
-        double share = s == stop ? 1.0 : friction_at(fl, s, output_now(fl, s, M->w, phase).first).value;
+    for (int s = 0; s < fl->n_stops; s++) {
+        bool slides = is_slider(fl, s) && fl->slides[s] != 0;
+        double share = slides ? friction_at(fl, s, output_now(fl, s, M->w, phase).first).value : 1.0;
+        double jump = (closes ? dashpot : -dashpot) * share; /* of the force, over the speed */
+        if (slides && !isnan(held[s]))
+            jump = (share * pressing_now(fl, s, M->w, phase).value - held[s]) / speed;
+        else if (s != stop && !(slides && is_pressed(fl, s) && (int)stop_of(fl, s)->normal == stop))
+            continue;
         const double *push = push_of(fl, s);
         for (int k = 0; k < fl->size; k++)
             for (int c = 0; c < M->n_columns; c++)
-                M->columns[(size_t)k * M->n_columns + c] += impulse * share * push[k] * depth[c];
+                M->columns[(size_t)k * M->n_columns + c] -= jump * push[k] * depth[c];
     }
+    for (int c = 0; c < M->n_columns; c++) shift[c] = 0.0;
+    hold(M, phase, t, shift);
 }
 
 /* Whether the force jumps as a stop opens or closes. That of one that never pulls does so only
@@ -45,6 +63,9 @@ static void recouple(Motion *M)
 /* close a stop that is open, or open one that is closed, a time t after the start */
 static void switch_stop(Motion *M, int stop, double phase, double t)
 {
+    double *held = M->s->first_pushes;
+    bool jumps = M->with_columns && force_jumps(M, stop, phase);
+    if (jumps) fill_held(M, phase, held);
     M->closed[stop] = !M->closed[stop];
     for (int s = stop + 1; s < M->fl->n_stops; s++) {
         bool follows = is_pressed(M->fl, s) && (int)stop_of(M->fl, s)->normal == stop;
@@ -58,8 +79,7 @@ static void switch_stop(Motion *M, int stop, double phase, double t)
         slip_overloaded(M, phase);
         press_on(M, stop, phase, t);
     }
-    if (M->with_columns && force_jumps(M, stop, phase))
-        jump_columns(M, stop, phase, t, M->closed[stop]);
+    if (jumps) jump_columns(M, stop, phase, t, M->closed[stop], held);
 }
 
 /* Open and close the stops that do so at the very instant of another one's event, each to the

@@ -174,6 +174,21 @@ def test_more_random_systems_agree(seed):
     agrees(seed)
 
 
+@pytest.mark.parametrize("law", [Friction(3.0), Friction(0.3), Friction(0.2, 0.3)])
+def test_derivatives_pass_a_dashpot_that_is_hit_while_something_sticks(law):
+    """Its force jumps: what sticks takes its share, or slips at once."""
+    system = System.from_matrices(
+        [[1.0, 0.5], [0.5, 1.0]], np.eye(2), {"x": [1.0, 0.0], "y": [0.0, 1.0]},
+        damping=0.05 * np.eye(2), stops=[Stop("x", 20.0, 1.0, 0.3, dashpot=2.0)],
+        dampers=[DryFriction("y", 1.0, law)], excitation=[HarmonicForce("x", 0.05)],
+    )  # fmt: skip
+    flow, z = FlowMap(system), to_state(system, np.array([0.0, 0.0, 0.8, 0.0]))[None]
+    phases = np.array([0.0, 1.2])
+    found = flow.shoot(z, phases, 1.0)
+    assert found.closings[0] == 1
+    assert off_differences(flow, found, z, phases, 1.0, 1e-6) < 5e-6
+
+
 @pytest.mark.parametrize(("name", "index"), [("friction", 0), ("friction", 1), ("normal_force", 1)])
 @pytest.mark.parametrize(
     "laws", [(Friction(0.3, 0.5, 0.2), 0.4), (Friction(0.3, 0.5), Friction(0.4, 0.6))]
