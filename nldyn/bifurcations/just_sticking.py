@@ -18,54 +18,59 @@ BESIDE = 1e-4  # of it: so long before and behind an instant the slip tells how 
 SLOW = 0.01  # of the fastest change: that of a slip that turns where it comes to rest
 TOUCH = 1e-6  # of the fastest slip: a slowest one that counts as none
 NONE = 1e-12  # the same as it sticks
+SAMPLES = 4000
 ALIKE = 2e-3  # relative: the friction at rest and the force by which it turns at once
 
 
 def just_sticks(orbit: Orbit) -> Slider | None:
     """A slider that all but begins or ceases to stick, where its friction drops at once."""
+    phases = np.linspace(*orbit.trajectory.span, SAMPLES)
     for number, slider in enumerate(orbit.system.sliders):
         law = slider.friction
-        drops = law.adhesion > 0.0 and law.fading_speed is None
-        if drops and (_touches_rest(orbit, number) or _turns_or_stays(orbit, number)):
+        if law.adhesion == 0.0 or law.fading_speed is not None:
+            continue
+        slips = _slips(orbit, number, phases)
+        fastest = np.abs(np.diff(slips)).max() / (phases[1] - phases[0])
+        if _touches_rest(slips) or _turns_or_stays(orbit, number, fastest):
             return slider
     return None
 
 
-def _touches_rest(orbit: Orbit, number: int) -> bool:
-    """Whether its slip becomes zero, or all but that, without a change of its sense."""
-    slips = _slips(orbit, number, np.linspace(*orbit.trajectory.span, 4000))
-    slips[np.abs(slips) < NONE * np.abs(slips).max()] = 0.0
+def _touches_rest(slips: Real) -> bool:
+    """Whether a slip becomes zero, or all but that, without a change of its sense."""
     size = np.abs(slips)
+    slides = size > NONE * size.max()
     turns = (size[1:-1] < np.minimum(size[:-2], size[2:])) & (slips[:-2] * slips[2:] > 0.0)
+    turns &= slides[:-2] & slides[2:]
     return bool(size[1:-1][turns].min(initial=np.inf) < TOUCH * size.max())
 
 
-def _turns_or_stays(orbit: Orbit, number: int) -> bool:
+def _turns_or_stays(orbit: Orbit, number: int, fastest: float) -> bool:
     """Whether it all but does not rest, or not come to rest, or turns by its friction at rest."""
     motion, law = orbit.trajectory, orbit.system.sliders[number].friction
     record, held = motion.record, held_in_pieces(motion, number)
     length = motion.span[1] - motion.span[0]
     alone = held & ~np.roll(held, 1) & ~np.roll(held, -1)
+    if motion.omega * record.duration[alone].min(initial=np.inf) < SHORT * length:
+        return True
     comes = np.roll(record.event == len(orbit.system.stops) + number, 1) & ~np.roll(held, 1)
-    pace = {side: _pace(orbit, number, record.phase, side * BESIDE * length) for side in (-1, 1)}
-    before, behind = pace[-1][comes & ~held], pace[1][comes & ~held]
-    force = law.coefficient * (before + behind) / (before - behind)  # over what presses it on
-    stops = pace[-1][comes & held]
-    return bool(
-        motion.omega * record.duration[alone].min(initial=np.inf) < SHORT * length
-        or stops.min(initial=np.inf) < SLOW * pace[-1].max()
-        or (np.abs(force / (law.coefficient + law.adhesion) - 1.0) < ALIKE).any()
-    )
+    stops, turns = record.phase[comes & held], record.phase[comes & ~held]
+    if _pace(orbit, number, stops, -BESIDE).min(initial=np.inf) < SLOW * fastest:
+        return True
+    before, behind = (_pace(orbit, number, turns, side * BESIDE) for side in (-1, 1))
+    most = (law.coefficient + law.adhesion) * (before - behind)  # the same of friction at rest
+    return bool((np.abs(law.coefficient * (before + behind) - most) < ALIKE * most).any())
 
 
-def _pace(orbit: Orbit, number: int, phases: Real, away: float) -> Real:
-    """Change of a slip from zero at phases, by that so far away."""
+def _pace(orbit: Orbit, number: int, phases: Real, share: float) -> Real:
+    """Change of a slip from zero at phases, by that a share of the motion away."""
+    away = share * (orbit.trajectory.span[1] - orbit.trajectory.span[0])
     return np.abs(_slips(orbit, number, phases + away)) / abs(away)
 
 
 def _slips(orbit: Orbit, number: int, phases: Real) -> Real:
     """Speeds of a slider on what it slides on, at ascending phases."""
-    motion, base = orbit.trajectory, orbit.system.sliders[number].friction.base_speed
+    motion, base = orbit.trajectory, orbit.system.sliders[number].friction.base_speeds[0]
     begin, end = motion.span
     within = (phases - begin) % (end - begin) + begin
     order = np.argsort(within, kind="stable")

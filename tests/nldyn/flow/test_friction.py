@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from sliding import Body, Contact, Wall
+from sliding import Body, Contact, Wall, off_differences
 
 from nldyn import (
     ConstantForce,
@@ -129,22 +129,6 @@ def agrees(seed, walled=False, drops=False):
     np.testing.assert_allclose(from_state(system, found.ends[0]), expected, atol=1e-8 * size)
     steps = (1e-5, 1e-6)  # states are good to 1e-10, and the longer step may pass over a corner
     assert min(off_differences(flow, found, z, phases, omega, step) for step in steps) < 3e-5
-
-
-def off_differences(flow, found, z, phases, omega, step):
-    """How far derivatives by the state and by ω are off those by differences, of their size."""
-
-    def slope(by_state, by_omega):
-        up, down = (
-            flow.shoot(z + way * step * by_state, phases, omega * (1.0 + way * step * by_omega))
-            for way in (1.0, -1.0)
-        )
-        return (up.ends[0] - down.ends[0]) / (2.0 * step)
-
-    by = np.array([slope(row, 0.0) for row in np.eye(z.size)]).T
-    by_omega = slope(np.zeros(z.size), 1.0) / omega
-    pairs = (found.jacobians[0], by), (found.d_omega[0], by_omega)
-    return max(np.abs(a - b).max() / max(np.abs(b).max(), 1.0) for a, b in pairs)
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -18,6 +18,7 @@ from nldyn import (
     continue_branch,
     solve_orbit,
 )
+from nldyn.bifurcations.just_sticking import just_sticks
 from nldyn.branches.endings import Ending
 from nldyn.flow.sliding import slider_measures
 from nldyn.system import DryFriction, Friction
@@ -121,6 +122,9 @@ def test_motions_with_one_stop_a_cycle_end_where_that_takes_no_time():
 
     assert last.omega == pytest.approx(brentq(missing, 0.62, 0.75, xtol=1e-14), rel=1e-8)
     assert last.friction[0].stuck < 1e-6
+    assert just_sticks(last) is not None
+    assert just_sticks(branch.points[len(branch.points) // 2]) is None
+    assert just_sticks(solve_orbit(block(0.4, 0.8), 0.7 / TURN)) is None
 
 
 @pytest.mark.parametrize(("ratio", "larger"), [(0.6, 1.2), (0.7, 1.2), (0.7, 2.0)])

@@ -18,6 +18,7 @@ from nldyn import (
     save,
     solve_orbit,
 )
+from nldyn.bifurcations.just_sticking import just_sticks
 from nldyn.branches.endings import Ending, has_ending
 from nldyn.io import CheckpointFile
 from nldyn.system import CubicDamper, DryFriction, Friction
@@ -78,6 +79,7 @@ def test_stick_slip_with_a_drop_at_once_ends_where_the_block_just_gets_as_fast_a
     assert has_ending(branch.stop_reasons, Ending.JUST_STICKS)
     assert branch.values.max() == pytest.approx(brentq(missing, 0.15, 0.25), rel=1e-5)
     assert last.friction[0].stuck > 0.05  # it would stick for so long
+    assert just_sticks(start) is None
 
 
 STRIBECK = Friction(0.3, 0.4, 0.05)
