@@ -123,18 +123,20 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
         panels = _touching(motion, slider.stop)
     duration, place = rec.duration[panels], ends @ flow.rows[output]
     force, inner = rec.force[panels, output], rec.depth[panels, output]
+    belt = slider.friction.base_speeds[0]
     if slider.tangential_stiffness is not None:  # what slides is not what the spring is fixed to
         place = flow.places(ends)[:, flow.system.sprung.index(number)]
-        inner = place[panels, None] + inner - force / slider.tangential_stiffness
-    ways = np.diff(place)[panels] - slider.friction.base_speeds[0] * duration
-    size = np.abs(place).max() + np.abs(slider.friction.base_speeds[0] * duration).max(initial=0.0)
+        carried = belt * duration[:, None] * tables.chi[rec.kind[panels]]
+        inner = place[panels, None] + carried + inner - force / slider.tangential_stiffness
+    ways = np.diff(place)[panels] - belt * duration
+    size = np.abs(place).max() + np.abs(belt * duration).max(initial=0.0)
     held = held_in_pieces(motion, number)[panels]
     mobility = float(flow.mobility([output])[0, 0])
     pulled = np.where(held, mobility * np.abs(force).max(axis=1, initial=0.0) * duration**2, 0.0)
     slides = np.abs(ways) > np.where(held, UNMOVED, ROUNDING) * (size + pulled)
     along = np.column_stack([place[panels], inner, place[panels + 1]])[slides]
     moved = _ways_of_nodes(flow, along)
-    moved -= slider.friction.base_speeds[0] * _times_of_nodes(motion, panels[slides])
+    moved -= belt * _times_of_nodes(motion, panels[slides])
     pressed = rec.force[panels[slides], slider.stop] if slider.stop >= 0 else slider.normal_force
     loss = float((force[slides] * moved).sum())
     pressed_distance = float(np.abs(pressed * moved).sum())

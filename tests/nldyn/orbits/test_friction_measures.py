@@ -2,6 +2,7 @@
 
 import csv
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from nldyn import (
     FlowOptions,
     HarmonicForce,
     RigidStop,
+    RoundStop,
     Stop,
     System,
     continue_branch,
@@ -73,22 +75,42 @@ def test_a_block_that_is_held_loses_nothing_and_is_held_by_what_pulls_it():
     assert found.peak_force == pytest.approx(1.0 + spring, abs=1e-9)
 
 
-def balance_of(orbit):
-    """Work of the excitation in a period, what dampers take, and what the belt brings.
-
-    By a quadrature of our own. The impulse of friction along y is that of the springs.
-    """
+def over_a_period(orbit):
+    """Times that nodes of our own stand for, their phases, and places and speeds there."""
     ends = np.append(orbit.trajectory.record.phase, 2.0 * math.pi * orbit.period)
     nodes, weights = np.polynomial.legendre.leggauss(40)
     half = 0.5 * np.diff(ends)[:, None]
     phases = (ends[:-1, None] + half * (1.0 + nodes)).ravel()
-    lengths = (half * weights).ravel() / orbit.omega
     rows = np.array([orbit.system.participation[name] for name in NAMES]).T
     places, speeds = np.split(orbit.states(phases), 2, axis=1)
-    places, speeds = places @ rows, speeds @ rows
+    return (half * weights).ravel() / orbit.omega, phases, places @ rows, speeds @ rows
+
+
+def left_over(orbit):
+    """Work of the excitation in a period less what dampers take."""
+    lengths, phases, _, speeds = over_a_period(orbit)
     work = lengths @ (np.cos(phases) * (speeds @ FORCES))
-    damped = lengths @ ((speeds @ DAMPING) * speeds).sum(axis=1)
-    return work, damped, FALLING.base_speed * (lengths @ places @ STIFFNESS[1])
+    return work - lengths @ ((speeds @ DAMPING) * speeds).sum(axis=1)
+
+
+def brought_by_belt(orbit):
+    """What the belts bring: the impulse of friction along y or z is that of the springs."""
+    lengths, _, places, _ = over_a_period(orbit)
+    springs = dict(zip(NAMES, lengths @ places @ STIFFNESS, strict=True))
+    return math.fsum(
+        speed * springs[at]
+        for slider in orbit.system.sliders
+        for (at, _), speed in zip(slider.ends, slider.friction.base_speeds, strict=False)
+    )
+
+
+def brought_by_surface(orbit):
+    """The same of a surface in a round clearance that slides one way all the time."""
+    lengths, _, places, _ = over_a_period(orbit)
+    (ring,) = orbit.system.stops
+    depth = np.hypot(*places[:, :2].T) - ring.clearance
+    force = ring.stiffness * np.maximum(depth, 0.0) ** ring.exponent
+    return abs(ring.sliding_speed) * ring.friction * (lengths @ force)
 
 
 STICKING = pytest.mark.parametrize(("walled", "hz"), [(False, 0.3), (True, 0.1)])
@@ -97,13 +119,67 @@ STICKING = pytest.mark.parametrize(("walled", "hz"), [(False, 0.3), (True, 0.1)]
 @STICKING
 def test_what_the_excitation_gives_is_what_dampers_friction_and_impacts_take(walled, hz):
     orbit = solve_orbit(structure(walled), hz)
-    work, damped, brought = balance_of(orbit)
     hits = impacts(orbit)
     rigid = math.fsum(hits.loss[hits.stop == 1])
     assert (rigid > 1e-2) == walled
     lost = [found.loss for found in orbit.friction]
     assert min(lost) > 1e-2
-    assert work + brought == pytest.approx(damped + math.fsum(lost) + rigid, rel=1e-9)
+    given = left_over(orbit) + brought_by_belt(orbit)
+    assert given == pytest.approx(math.fsum(lost) + rigid, rel=1e-9)
+
+
+BELTS = (0.05, -2.0)
+ELASTIC = ("force", "linear", "Hertz")
+ALONG_Y = {
+    "alone": {},
+    "spring": {"tangential_stiffness": 5.0},
+    "plane": {"tangential_stiffness": 5.0, "second_tangent": "z"},
+}
+
+
+def rubbing(stops=(), dampers=()):
+    return System.from_matrices(
+        MASS, STIFFNESS, dict(zip(NAMES, np.eye(3), strict=True)), damping=DAMPING, stops=stops,
+        dampers=dampers,
+        excitation=[HarmonicForce(name, f) for name, f in zip(NAMES, FORCES, strict=True)],
+    )  # fmt: skip
+
+
+def pressed_on(by, along, belt):
+    """What slides along y, on a belt: pressed on by a force or a stop along x."""
+    law = Friction(0.3, base_speed=(belt, -0.5 * belt) if along == "plane" else belt)
+    if by == "force":
+        return rubbing(dampers=[DryFriction("y", 1.5, law, **ALONG_Y[along])])
+    if by == "rigid":
+        return rubbing([RigidStop("x", 0.7, 0.9, friction=law, tangent="y")])
+    how = {"friction": law, "tangent": "y", **ALONG_Y[along]}
+    return rubbing([Stop("x", 60.0, 1.5 if by == "Hertz" else 1.0, 0.3, **how)])
+
+
+@pytest.mark.parametrize("belt", BELTS)
+@pytest.mark.parametrize(("by", "along"), [*product(ELASTIC, ALONG_Y), ("rigid", "alone")])
+def test_losses_and_wear_are_what_the_balance_of_energy_leaves(by, along, belt):
+    orbit = solve_orbit(pressed_on(by, along, belt), 0.3)
+    (found,) = orbit.friction
+    rigid = math.fsum(impacts(orbit).loss) if by == "rigid" else 0.0
+    assert found.loss > 1e-3
+    given = left_over(orbit) + brought_by_belt(orbit)
+    assert found.loss + rigid == pytest.approx(given, rel=1e-9)
+    if by != "rigid":
+        assert found.pressed_distance == pytest.approx(found.loss / 0.3, rel=1e-12)
+    if by == "force":
+        assert found.distance == pytest.approx(found.loss / (0.3 * 1.5), rel=1e-9)
+
+
+@pytest.mark.parametrize("surface", [0.0, 5.0, -5.0])
+def test_losses_in_a_round_clearance_are_what_the_balance_of_energy_leaves(surface):
+    ring = RoundStop(("x", "y"), 60.0, 0.3, 1.0, friction=0.2, surface_speed=surface)
+    orbit = solve_orbit(rubbing([ring]), 0.3)
+    (found,) = orbit.friction
+    assert found.loss > 1e-3 and found.open > 0.0
+    given = left_over(orbit) + (brought_by_surface(orbit) if surface else 0.0)
+    assert found.loss == pytest.approx(given, rel=1e-9)
+    assert found.pressed_distance == pytest.approx(found.loss / 0.2, rel=1e-12)
 
 
 @STICKING
