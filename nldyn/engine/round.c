@@ -337,6 +337,14 @@ static int place_of(const Panel *panel, int stop)
     return place;
 }
 
+/* whether a row acts in a panel */
+static bool acts_in(const Panel *panel, int stop)
+{
+    for (int a = 0; a < panel->na; a++)
+        if (panel->active[a] == stop) return true;
+    return false;
+}
+
 /* row of the other direction of a round clearance, or -1 */
 static int partner_row(const Flow *fl, int s)
 {
