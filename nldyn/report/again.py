@@ -18,6 +18,7 @@ from nldyn.base.errors import SceneError, SystemModelError
 from nldyn.branches.branch import Branch
 from nldyn.io.store import load
 from nldyn.report.answer import answer_lines
+from nldyn.report.contact import contact_figure
 from nldyn.report.offline import Table, unpacked
 from nldyn.report.page import Drawn, write_page
 from nldyn.report.results import FILES, software_name, summary, tables_of
@@ -118,7 +119,10 @@ def report_again(
     progress("orbits", 0.0, 0.6)
     with result_directory(directory, "report") as new:
         page = new / "report.html"
-        write_page(diagram, page, tables, told, scene=scene, surface=surface, notes=notes)
+        write_page(
+            diagram, page, tables, told, contact=contact_figure(diagram, scene), scene=scene,
+            surface=surface, notes=notes,
+        )  # fmt: skip
     return notes
 
 

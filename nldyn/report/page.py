@@ -28,7 +28,7 @@ from nldyn.plot.diagram import (
     stop_places,
 )
 from nldyn.plot.words import Along, axis_unit, direction_of, displacement_of, units_of
-from nldyn.report.contact import contact_figure, png_of
+from nldyn.report.contact import png_of
 from nldyn.report.deflection import surface_content
 from nldyn.report.offline import Table, as_table, versions, write_html
 from nldyn.report.orbit_content import (
@@ -95,6 +95,7 @@ def write_page(
     tables: Mapping[str, Table],
     summary: Mapping[str, Any],
     *,
+    contact: Figure | None,
     scene: Scene | None = None,
     surface: Mapping[str, Any] | None = None,
     notes: Iterable[str] = (),
@@ -112,6 +113,8 @@ def write_page(
         ``points``, ``special_points`` and ``ends`` of the branches, as `write_results` writes them.
     summary : dict
         What `nldyn.report.results.summary` says of the diagram.
+    contact : matplotlib.figure.Figure or None
+        What `contact_figure` drew of it.
     scene : Scene, optional
         Its text and its title are shown.
     surface : dict, optional
@@ -159,7 +162,7 @@ def write_page(
         "stops": stops_of(branches[0].points[0]) if branches else NO_STOPS,
         "friction": friction_columns(branches[0].points[0]) if branches else [],
         "orbits": orbits,
-        "contact": png_of(contact_figure(diagram, scene)),
+        "contact": png_of(contact),
         "frequency": png_of(frequency_figure(diagram)),
         "period": "period" if are_limit_cycles(branches) else "excitation period",
         "tables": {

@@ -158,7 +158,10 @@ def write_results(
             (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
         page = folder / "report.html"
         surface = drawn.surface if drawn else None
-        write_page(diagram, page, tables, told, scene=scene, surface=surface, yscale=yscale)
+        write_page(
+            diagram, page, tables, told, contact=pressed, scene=scene, surface=surface,
+            yscale=yscale,
+        )  # fmt: skip
     return Path(directory)
 
 

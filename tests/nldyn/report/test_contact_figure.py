@@ -5,6 +5,8 @@ import pytest
 
 from nldyn import HarmonicForce, System, contact_area, continue_branch, solve_orbit
 from nldyn.report.contact import contact_figure
+from nldyn.report.offline import unpacked
+from nldyn.report.results import write_results
 from nldyn.search.diagram import Diagram
 
 
@@ -30,3 +32,16 @@ def test_what_is_pressed_is_drawn_where_nothing_slides(friction):
 
 def test_nothing_is_drawn_where_nothing_touches():
     assert drawn(0.3, 9.0)[1] is None
+
+
+def test_the_report_draws_it_once(tmp_path, monkeypatch):
+    diagram, counted = Diagram((drawn(0.3, 0.1)[0],), (0.69, 0.71), "a"), []
+
+    def counts(*given):
+        counted.append(given)
+        return contact_figure(*given)
+
+    monkeypatch.setattr("nldyn.report.results.contact_figure", counts)
+    folder = write_results(diagram, tmp_path / "out")
+    assert len(counted) == 1 and (folder / "contact.png").is_file()
+    assert unpacked((folder / "report.html").read_text(encoding="utf-8"))["contact"]
