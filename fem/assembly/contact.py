@@ -131,7 +131,8 @@ def contact_points(
     """
     normal = unit_vector(at, direction)
     if points == "nodes":
-        blocks, measure = [node_block(component, component.model.mesh.nodes(at))], "node"
+        nodes = component.model.mesh.nodes(at)
+        blocks, measure = [node_block(component, at, nodes, surface * normal)], "node"
     else:
         whole = isinstance(points, int) and not isinstance(points, bool)
         if not (whole and 1 <= int(points) <= MOST_PLACES):
@@ -211,11 +212,13 @@ def gathered(
     )
 
 
-def node_block(component: Component, nodes: IntArray) -> Block:
-    dofs = component.numbering.dofs(nodes)[:, :3]
-    shapes = np.broadcast_to(np.eye(3), (len(nodes), 1, 3, 3))
-    places = component.model.mesh.points[nodes][:, None]
-    return places, np.ones((len(nodes), 1)), shapes, dofs
+def node_block(component: Component, at: str, nodes: IntArray, arm: FloatArray) -> Block:
+    """Nodes, or places an arm off them that turns with them."""
+    if np.any(arm) and np.any(component.numbering.rotation[nodes] < 0):
+        raise _off_solids(component, at)
+    values = np.ones((len(nodes), 1, 1))
+    places = component.model.mesh.points[nodes][:, None] + arm
+    return places, values[..., 0], *facet_shapes(component, nodes[:, None], values, arm)
 
 
 def _blocks(
@@ -291,10 +294,14 @@ def check_surface(component: Component, at: str, surface: float) -> None:
     model = component.model
     facets = [nodes.ravel() for nodes in model.facets_on(at).values()]
     if surface and facets and np.any(component.numbering.rotation[np.concatenate(facets)] < 0):
-        raise ModelError(
-            f"{model.mesh.source}: contact at {at!r}: surface is for beams and shells, not for "
-            "faces of solids"
-        )
+        raise _off_solids(component, at)
+
+
+def _off_solids(component: Component, at: str) -> ModelError:
+    return ModelError(
+        f"{component.model.mesh.source}: contact at {at!r}: surface is for beams and shells, not "
+        "for faces of solids"
+    )
 
 
 def beam_block(

@@ -159,7 +159,7 @@ def opposite_points(
     mesh, n = component.model.mesh, points.direction
     owner = f"{mesh.source}: contact of {points.at!r} against {at!r}"
     size = float(np.ptp(mesh.points, axis=0).max())
-    surfaces = _surfaces(component, at, surface, n) or [_nodes(component, at)]
+    surfaces = _surfaces(component, at, surface, n) or [_nodes(component, at, -surface * n)]
     met = [_met(cells, points.places, n, OFF * size) for cells in surfaces]
     chosen = _nearest(met, len(points.places))
     numbers = np.concatenate([each.points for each in chosen])
@@ -213,11 +213,11 @@ def _lines(component: Component, name: str, lines: IntArray, arm: FloatArray) ->
     return _Cells("line", corners, np.full((len(lines), 3), np.nan), block)
 
 
-def _nodes(component: Component, at: str) -> _Cells:
+def _nodes(component: Component, at: str, arm: FloatArray) -> _Cells:
     nodes = component.model.mesh.nodes(at)
 
     def block(cells: IntArray, _: FloatArray) -> Block:
-        return node_block(component, nodes[cells])
+        return node_block(component, at, nodes[cells], arm)
 
     corners = component.model.mesh.points[nodes][:, None]
     return _Cells("node", corners, np.full((len(nodes), 3), np.nan), block)

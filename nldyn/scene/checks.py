@@ -59,6 +59,9 @@ def check_scene(scene: Scene, file: Path) -> None:
     _check_structure(scene, report)
     _check_modal(scene, report)
     _check_matrices(scene, report)
+    if scene.mesh is not None and scene.mesh.offset is not None:
+        fault = "is for a component of several: nothing depends on where a structure alone lies"
+        raise report(("mesh", "offset"), fault)
     _check_components(scene, file)
     _check_joints(scene, report)
     _check_interface_names(scene, report)

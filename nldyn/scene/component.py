@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 import fem
 from nldyn.base.errors import SceneError
 from nldyn.base.resources import data_directory
@@ -56,6 +58,8 @@ def build_component(scene: Scene, refinement: int = 1) -> fem.Component:
         mesh = _in_metres(scene, fem.read_mesh(path, _mesh_places(scene), ignore))
         if scene.mesh.merge:
             mesh = fem.joined([mesh], None if scene.mesh.merge is True else scene.mesh.merge)
+        if scene.mesh.offset is not None:
+            mesh = mesh.with_points(mesh.points + np.array(scene.mesh.offset))
     mesh = _noted(scene, _with_places(scene, mesh))
     described = with_described_parts(scene, mesh)
     with told_as(scene, ("mesh", "file"), fem.ModelError):

@@ -266,6 +266,8 @@ def _beside(found: Found) -> list[str]:
         told.append(f"{pair.alone} more have nothing opposite and are left out")
     if pair.gaps.min() < 0.0:
         told.append(f"in the mesh the surfaces overlap by up to {-pair.gaps.min():.4g} m")
+    if pair.gaps.max() > 0.0:
+        told.append(f"in the mesh the surfaces are up to {pair.gaps.max():.4g} m apart")
     if pair.tilt > TILTED:
         told.append(f"the other surface is inclined by up to {pair.tilt:.3g} degrees")
     return told

@@ -79,6 +79,66 @@ def test_a_beam_on_a_foundation_that_lifts_off_sinks_and_parts_as_in_closed_form
         assert abs(share - 0.5 * math.pi) < 1.6 * math.pi / depths.size
 
 
+def parted(lines, points):
+    """How far a force F brings two long beams together, and the closed form; penetrations.
+
+    The difference of their deflections bends as one beam of 1/EI = 1/EI₁ + 1/EI₂ on the layer
+    between them. Halves: their middles neither turn nor move along; one end is held.
+    """
+    bed, heights = 2e5, (0.01, 0.014)
+    bending = 1.0 / sum(12.0 / (2.1e11 * 0.02 * height**3) for height in heights)
+    wave = (bed / (4.0 * bending)) ** 0.25
+    halves = []
+    for name, height, y, count in zip(("low", "high"), heights, (0.0, 0.012), lines, strict=True):
+        ends = {"middle": (0.0, y), "end": (1.6 * math.pi / wave, y)}
+        supports = [fem.Support("middle", ("x", "rotation")), fem.Support("end", ("y",))]
+        halves.append(
+            fem.assemble(
+                fem.StructureModel(
+                    fem.frame_mesh(ends, [(name, "middle", "end", count)]),
+                    parts={name: fem.BeamPart(STEEL, fem.RectangularSection(0.02, height))},
+                    supports=supports[: 1 + (name == "low")],
+                    interfaces={"middle": fem.Interface("middle", "y")},
+                    plane=True,
+                )
+            )
+        )
+    near = fem.contact_points(halves[0], "low", "y", points=points, surface=0.005)
+    pair = fem.opposite_points(halves[1], near, "high", surface=0.007)
+    models, names = {}, []
+    for half, side in zip(halves, (pair.near, pair.far), strict=True):
+        of = [f"bed {i + 1}" for i in range(len(side.places))]
+        area = cms.Area(of, bed * side.weights, tolerance=1e-10)
+        vectors = dict(zip(of, side.vectors(), strict=True))
+        part = "low" if half is halves[0] else "high"
+        models[part] = cms.reduce(half.with_interfaces(vectors, {"bed": area}), modes=12)
+        names.append([f"{part}.{name}" for name in of])
+    system = System.from_reduced(
+        cms.couple(models, []),
+        stops=contact_area("bed", names[0], bed, weights=pair.near.weights, against=names[1]),
+        excitation=[ConstantForce("low.middle", 25.0), ConstantForce("high.middle", -25.0)],
+    )
+    q = rest(system)
+    depths = np.array([system.stop_vector(stop) @ q for stop in system.stops])
+    near_by = float(system.vector_between("low.middle", "high.middle") @ q)
+    known = 50.0 * wave / (2.0 * bed) / math.tanh(0.5 * math.pi)
+    return near_by / known - 1.0, depths, pair
+
+
+def test_two_unlike_beams_on_a_layer_part_as_one_in_closed_form_where_meshes_do_not_match():
+    """Weitsman's form for both together; errors of cubic beams fall with the fourth power."""
+    errors = []
+    for count in (6, 12, 24):
+        error, depths, pair = parted((count, round(1.4 * count)), 3)
+        assert np.all(pair.gaps == 0.0) and not pair.alone
+        errors.append(abs(error))
+        closed = np.flatnonzero(depths > 0.0)
+        assert np.array_equal(closed, np.arange(closed.size))
+        share = closed.size / depths.size * 1.6 * math.pi
+        assert abs(share - 0.5 * math.pi) < 1.6 * math.pi / count
+    assert errors[2] < 1e-5 and np.log2(errors[0] / errors[2]) > 7.5
+
+
 def landing(points, modes=3, stiffness=2e4, **more):
     """A cantilever that lands on a curved support."""
     mesh = fem.frame_mesh({"root": (0, 0), "tip": (0.5, 0)}, [("strip", "root", "tip", 6)])

@@ -31,6 +31,9 @@ class MeshTable(Table):
     """Unit of the lengths in the file: `"m"`, `"cm"`, `"mm"` or `"inch"`. It must be given
     where the file states another one than m. Everything else, in the scene and in all output,
     is SI. Not for files whose masses, springs or parts are taken over."""
+    offset: Triple | None = None
+    """[m] Of a component: how far along x, y and z its mesh is moved from where the file has it, so
+    that one file serves twice. All coordinates of the scene are those after that."""
     ignore: list[str] = []
     """Cells to leave out by name: groups, kinds of cells such as `"quad"`, element types of
     Abaqus such as `"S4R"`, or `"ungrouped"` for the cells in no group. `nldyn check` tells how

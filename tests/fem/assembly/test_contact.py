@@ -34,6 +34,17 @@ def block(kind="hexahedron20", counts=(2, 3, 1)):
     return fem.assemble(fem.StructureModel(mesh, {"body": fem.SolidPart(STEEL)}))
 
 
+@pytest.mark.parametrize("points", [2, "nodes"])
+def test_the_surface_of_a_beam_slides_as_its_axis_turns(points):
+    arm = clamped_frame()
+    found = fem.contact_points(arm, "arm", "-y", points=points, surface=0.05)
+    u = spsolve(arm.stiffness, arm.interfaces["tip"])
+    x, stiffness = found.places[:, 0], 2e11 * 0.02 * 0.01**3 / 12.0
+    assert np.allclose(found.places[:, 1], -0.05)
+    expected = 0.05 * (12.0 * x - 3.0 * x**2) / (6.0 * stiffness)
+    assert np.allclose(found.vectors("x") @ u, expected, rtol=1e-10)
+
+
 @pytest.mark.parametrize("points", [1, 3, "nodes"])
 def test_points_of_a_beam_move_as_its_axis_does_under_a_force_at_its_tip(points):
     arm = clamped_frame()
@@ -42,16 +53,6 @@ def test_points_of_a_beam_move_as_its_axis_does_under_a_force_at_its_tip(points)
     x, stiffness = found.places[:, 0], 2e11 * 0.02 * 0.01**3 / 12.0
     expected = x**2 * (6.0 - x) / (6.0 * stiffness)
     assert np.allclose(found.vectors() @ u, expected, rtol=1e-10)
-
-
-def test_the_surface_of_a_beam_slides_as_its_axis_turns():
-    arm = clamped_frame()
-    found = fem.contact_points(arm, "arm", "-y", points=2, surface=0.05)
-    u = spsolve(arm.stiffness, arm.interfaces["tip"])
-    x, stiffness = found.places[:, 0], 2e11 * 0.02 * 0.01**3 / 12.0
-    assert np.allclose(found.places[:, 1], -0.05)
-    expected = 0.05 * (12.0 * x - 3.0 * x**2) / (6.0 * stiffness)
-    assert np.allclose(found.vectors("x") @ u, expected, rtol=1e-10)
 
 
 def test_beams_of_a_structure_are_those_of_a_frame():
@@ -131,6 +132,7 @@ def test_what_makes_no_area_is_refused_in_a_sentence():
         (arm, "arm", "y", {"points": 0}, "points must be"),
         (arm, "arm", "z", {"points": 2}, "nothing of it moves along"),
         (arm, "root", "y", {"points": "nodes"}, "nothing of it moves along"),
+        (body, "z1", "z", {"points": "nodes", "surface": 0.1}, "surface is for beams and shells"),
         (arm, "wing", "y", {}, "wing"),
         (body, "z1", "x", {}, "90 degrees off its direction"),
         (body, "z1", "z", {"surface": 0.1}, "surface is for beams and shells"),

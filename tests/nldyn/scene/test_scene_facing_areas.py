@@ -113,6 +113,33 @@ def test_beams_whose_lines_end_elsewhere_touch_where_they_face_each_other(tmp_pa
     assert build_system(scene).stops[3].against == "high.low against 4"
 
 
+def test_one_file_serves_twice_where_a_component_is_moved(tmp_path, caplog):
+    """As two files whose coordinates differ by that."""
+    away = pair_of(tmp_path).text.replace(
+        'file = "high.vtu"', f'file = "high.vtu"\noffset = [0.0, {HEIGHT + 1e-4}, 0.0]'
+    )
+    write_beam(tmp_path, "high", 0.0, 6)
+    with caplog.at_level("INFO", logger="nldyn"):
+        reduced = build_reduced(scene_of(tmp_path, away))
+    assert "in the mesh the surfaces are up to 0.0001 m apart" in caplog.text
+    moved = build_system(scene_of(tmp_path, away))
+    given = build_system(pair_of(tmp_path))
+    assert np.allclose([s.gap for s in moved.stops], [s.gap for s in given.stops], atol=1e-16)
+    assert np.allclose(moved.natural_frequencies, given.natural_frequencies, rtol=1e-12)
+    assert reduced.interfaces == build_reduced(pair_of(tmp_path)).interfaces
+
+
+def test_a_structure_alone_is_not_moved(tmp_path):
+    write_beam(tmp_path, "low", 0.0, 6)
+    text = (
+        BEAM.format(name="low")
+        .replace("components.low.", "")
+        .replace('file = "low.vtu"', 'file = "low.vtu"\noffset = [0.0, 1.0, 0.0]')
+    )
+    with pytest.raises(SceneError, match=r"mesh\.offset is for a component of several"):
+        scene_of(tmp_path, text + LOAD.format(name="low", phase=0).replace("low.tip", "tip") + REST)
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
