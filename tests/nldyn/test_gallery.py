@@ -10,7 +10,8 @@ import pytest
 
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 SCRIPTS = sorted(GALLERY.glob("*.py"))
-SLOW = {"block_in_circles", "lyapunov", "run_up", "tongue", "two_wells"}  # above two seconds
+# above two seconds
+SLOW = {"block_in_circles", "leaf_spring", "lyapunov", "run_up", "tongue", "two_wells"}
 
 
 def test_there_are_twenty_or_more():
