@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
-from nldyn.flow.flow_map import FlowMap, Trajectory
-from nldyn.flow.gauss import SMOOTH, fine_table, peaks
+from nldyn.flow.flow_map import Trajectory
+from nldyn.flow.gauss import fine_table, peaks
 from nldyn.flow.rigid_impacts import rigid_impacts, rubbed
 from nldyn.system.friction import Slider
 
@@ -135,7 +135,7 @@ def _measures_of(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
     pulled = np.where(held, mobility * np.abs(force).max(axis=1, initial=0.0) * duration**2, 0.0)
     slides = np.abs(ways) > np.where(held, UNMOVED, ROUNDING) * (size + pulled)
     along = np.column_stack([place[panels], inner, place[panels + 1]])[slides]
-    moved = _ways_of_nodes(flow, along)
+    moved = flow.tables.ways(along)
     moved -= belt * _times_of_nodes(motion, panels[slides])
     pressed = rec.force[panels[slides], slider.stop] if slider.stop >= 0 else slider.normal_force
     loss = float((force[slides] * moved).sum())
@@ -193,11 +193,6 @@ def _pressed_way(motion: Trajectory, slider: Slider, panels: NDArray[np.intp], w
     return float((pressed * way).sum())
 
 
-def _ways_of_nodes(flow: FlowMap, values: Real) -> Real:
-    """Ways (k, m) of the nodes of panels, by values (k, m + 2) at starts, nodes and ends."""
-    return np.asarray(flow.tables.weights[SMOOTH] * (values @ flow.tables.derivative.T))
-
-
 def _times_of_nodes(motion: Trajectory, panels: NDArray[np.intp]) -> Real:
     """Times (k, m) that the nodes of panels stand for."""
     rec = motion.record
@@ -221,7 +216,7 @@ def _round_measures(motion: Trajectory, ring: Slider, ends: Real) -> SliderMeasu
         at = ends @ flow.rows[row] - centre
         places.append(np.column_stack([at[panels], rec.depth[panels, row], at[panels + 1]]))
     x, y = (place[:, 1:-1] for place in places)
-    dx, dy = (_ways_of_nodes(flow, place) for place in places)
+    dx, dy = (flow.tables.ways(place) for place in places)
     way = (x * dy - y * dx) / np.hypot(x, y)
     way = np.abs(way - ring.friction.base_speeds[0] * _times_of_nodes(motion, panels))
     way[sticks] = 0.0

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.base.optional import optional
-from nldyn.flow.flow_map import FlowMap
 from nldyn.flow.gauss import fine_table, peaks
 from nldyn.flow.rigid_impacts import compression_works, normal_losses, rigid_impacts
 from nldyn.longterm.simulation import Motion, end_state, motion_of
@@ -200,7 +199,8 @@ class _Pieces:
     duration: Real  # (P,)
     hz: Real  # (P,)
     event: NDArray[np.int64]  # (P,)
-    start: Real  # (P + 1, 2n) states z at the begins, and at the end of the last
+    ends: Real  # (P + 1, S) penetrations at the begins, and at the end of the last
+    speed: Real  # (P + 1, S) their rates
     depth: Real  # (P, S, m) of a panel, zero in flights and where a stop is open
     force: Real  # (P, S, m) normal forces
     kind: NDArray[np.int64]  # (P,)
@@ -218,13 +218,16 @@ def _pieces(motion: Motion) -> _Pieces:
         np.full(rec.phase.size, w / (2.0 * np.pi)) for rec, w in zip(records, omegas, strict=True)
     ]
     last = end_state(motion.stretches[-1])[None]
+    states = motion.flow.to_modal(np.concatenate([*(rec.start for rec in records), last]))
+    ends, speed = motion.system.depths_and_speeds(states)
     return _Pieces(
         np.concatenate(times),
         np.concatenate([rec.phase for rec in records]),
         np.concatenate([rec.duration for rec in records]),
         np.concatenate(hz),
         np.concatenate([rec.event for rec in records]),
-        np.concatenate([*(rec.start for rec in records), last]),
+        ends,
+        speed,
         np.concatenate([depth for depth, _ in contacts]),
         np.concatenate([force for _, force in contacts]),
         np.concatenate([rec.kind for rec in records]),
@@ -290,26 +293,24 @@ def _table_of_block(
 ) -> PanelTable:
     flow, kind = motion.flow, pieces.kind[panels]
     weights = pieces.duration[panels, None] * flow.tables.weights[kind]
-    nodal = pieces.force[panels, stop]
-    nodes = pieces.time[panels, None] + pieces.duration[panels, None] * flow.tables.chi[kind]
-    rate = _rates(flow, motion.states(nodes.ravel()), stop).reshape(nodes.shape)
+    force, depth = pieces.force[panels, stop], pieces.depth[panels, stop]
+    ends = pieces.ends[:, stop]
+    if flow.system.stops[stop].impulsive:  # at rest, where its depths are accelerations
+        ends, depth = np.zeros_like(ends), np.zeros_like(depth)
+    ways = flow.tables.ways(np.column_stack([ends[panels], depth, ends[panels + 1]]))
     fine = fine_table(flow.tables.nodes.size)
-    depth, force = pieces.depth[panels, stop] @ fine.T, nodal @ fine.T
-    work = 0.5 * (force[:, 1:] + force[:, :-1]) * np.diff(depth, axis=1)
+    fine_depth, fine_force = depth @ fine.T, force @ fine.T
+    mean_force = 0.5 * (fine_force[:, 1:] + fine_force[:, :-1])
+    work = mean_force * np.diff(fine_depth, axis=1)
     return PanelTable(
         pieces.duration[panels],
-        np.einsum("pm,pm->p", weights, nodal),
-        np.einsum("pm,pm->p", weights, nodal**2),
+        np.einsum("pm,pm->p", weights, force),
+        np.einsum("pm,pm->p", weights, force**2),
         np.maximum(work, 0.0).sum(axis=1),
-        np.einsum("pm,pm,pm->p", weights, nodal, rate),
-        peaks(depth),
-        peaks(force),
+        np.einsum("pm,pm->p", force, ways),
+        peaks(fine_depth),
+        peaks(fine_force),
     )
-
-
-def _rates(flow: FlowMap, modal: Real, stop: int) -> Real:
-    """Rates of penetration (k,) of modal displacements and velocities (k, 2n)."""
-    return flow.system.depth_and_speed(flow.system.stops[stop], modal)[1]
 
 
 def _of_stop(motion: Motion, pieces: _Pieces, stop: int) -> dict[str, NDArray[Any]]:
@@ -319,7 +320,7 @@ def _of_stop(motion: Motion, pieces: _Pieces, stop: int) -> dict[str, NDArray[An
     first, last, panels, group = contact_runs(pieces.depth[:, stop], pieces.event, stop)
     table = _panel_table(motion, pieces, stop, panels)
     count = first.size
-    speed = _rates(motion.flow, motion.flow.to_modal(pieces.start), stop)
+    speed = pieces.speed[:, stop]
     end = pieces.time[last] + pieces.duration[last]
     return {
         "stop": np.full(count, stop, dtype=np.int64),

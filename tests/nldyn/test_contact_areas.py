@@ -14,6 +14,8 @@ from nldyn import (
     Parameter,
     System,
     contact_area,
+    impacts,
+    simulate,
     solve_orbit,
 )
 from nldyn.app.describe import describe_rest, describe_system
@@ -208,6 +210,15 @@ def test_many_points_at_once_move_as_in_an_independent_integration():
         assert off[half].max() < 1e-10 * np.abs(end[half]).max()
     mine = np.linalg.solve(left, found.jacobians[0] @ left)
     assert np.abs(mine - jacobian).max() < 1e-8 * np.abs(jacobian).max()
+
+
+def test_impacts_of_many_points_are_read_from_what_the_simulation_has_recorded(monkeypatch):
+    motion = simulate(bed(), 9.0, 2)
+    runs, run = [], FlowMap._call
+    monkeypatch.setattr(FlowMap, "_call", lambda *a: runs.append(a) or run(*a))
+    found = impacts(motion)
+    assert len(found) > 15 and len(runs) <= 1  # that to the very end of the motion
+    assert np.abs(found.loss).max() < 1e-12 * found.work.max()  # an elastic foundation
 
 
 def test_derivatives_by_the_numbers_of_an_area_of_many_points_are_those_of_differences():
