@@ -173,27 +173,54 @@ class RigidRotor:
             self.ways[i] = OPEN
         return y
 
-    def strike(self, t: float, y: Vector, i: int) -> tuple[Vector, float]:
-        """The state behind an impact, and the time of the flight behind it."""
-        ring, y = self.rings[i], y.copy()
+    def closing(self, y: Vector, i: int) -> float:
+        """Speed at which a ring closes."""
+        ring = self.rings[i]
+        return float(ring.place(y[: self.n])[0] @ ring.rows @ y[self.n :])
+
+    def pushed(self, t: float, y: Vector, i: int) -> float:
+        """Acceleration at which it does."""
+        ring = self.rings[i]
         n, across, radius = ring.place(y[: self.n])
+        w = float(across @ ring.rows @ y[self.n :])
+        return float(n @ ring.rows @ self.motion(t, y)[0]) + ring.sense * w * w / radius
+
+    def hit(self, y: Vector, i: int, e: float) -> Vector:
+        """The state behind an impact with restitution e."""
+        ring, y = self.rings[i], y.copy()
+        n, across, _ = ring.place(y[: self.n])
         pull = ring.rows.T @ np.array([n, across]).T
-        M = pull.T @ self.inverse @ pull
-        closing = float(n @ ring.rows @ y[self.n :])
-        slip = ring.slip(y[: self.n], y[self.n :])
-        before = y[self.n :].copy()
-        for e in (ring.restitution, 0.0):
-            impulse = blow(M, e, ring.friction, closing, slip)
-            y[self.n :] = before - self.inverse @ pull @ impulse
-            rebound, w = -float(n @ ring.rows @ y[self.n :]), across @ ring.rows @ y[self.n :]
-            moved, _ = self.motion(t, y)
-            push = float(n @ ring.rows @ moved) + ring.sense * w * w / radius
-            if not (rebound < LOW and push > 0.0):
+        M, slip = pull.T @ self.inverse @ pull, ring.slip(y[: self.n], y[self.n :])
+        impulse = blow(M, e, ring.friction, self.closing(y, i), slip)
+        y[self.n :] -= self.inverse @ pull @ impulse
+        return y
+
+    def strike(self, t: float, y: Vector, first: int) -> tuple[Vector, float]:
+        """The state behind an impact, with those that follow it at once, the fastest first.
+
+        And the time of the shortest flight behind it.
+        """
+        shut = [i for i, way in enumerate(self.ways) if way != OPEN or i == first]
+        pushes = {i: self.pushed(t, y, i) for i in shut}
+        while True:
+            i = max(shut, key=lambda i: self.closing(y, i))
+            speed = self.closing(y, i)
+            if speed <= 1e-13:
                 break
-        self.hits += 1
-        if rebound < LOW and push > 0.0:
-            return self.press(t, y, i), np.inf
-        return y, 2.0 * rebound / push if push > 0.0 else np.inf
+            e = self.rings[i].restitution
+            y = self.hit(y, i, 0.0 if e * speed < LOW and pushes[i] > 0.0 else e)
+            self.hits += 1
+        for i in shut:
+            self.ways[i] = OPEN
+        for i in shut:
+            if abs(self.closing(y, i)) < 1e-12:
+                y = self.press(t, y, i)
+        flights = [
+            -2.0 * self.closing(y, i) / push
+            for i in shut
+            if self.ways[i] == OPEN and (push := self.pushed(t, y, i)) > 0.0
+        ]
+        return y, min((each for each in flights if each > 0.0), default=np.inf)
 
     def turn(self, t: float, y: Vector, i: int) -> None:
         self.turned += 1

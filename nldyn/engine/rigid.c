@@ -16,6 +16,7 @@
 #define AT_START 1e5 /* the same at the start of a segment, whose state is known less well */
 #define SLOW 1e-7 /* share of the first speed below which impacts are no longer told apart */
 #define LOW 10.0 /* a body that would rebound no higher than this many roundings of the gap stays */
+#define SEIZED 1e-2 /* of a mobility: what is left of it as a force that rubs grows without bound */
 #define HIT_AGAIN 1e-3 /* rad of the excitation, within which a body that pushes off hits again */
 
 /* fill the rigid stops on which a body rests, and the sliders that stick; how many */
@@ -743,6 +744,19 @@ static void find_undecided(Motion *M)
         for (int a = p + 1; a < n; a++)
             for (int b = n - 1; b >= p; b--)
                 matrix[a * n + b] -= matrix[a * n + p] / matrix[p * n + p] * matrix[p * n + b];
+    }
+}
+
+/* The same of a rigid round clearance whose force has grown without bound: as the body goes round,
+ * its friction comes to take as much from what it holds as it gives. */
+static void find_seized(Motion *M, double phase)
+{
+    fill_directions(M, phase);
+    for (int r = 0; r < M->fl->n_stops; r++) {
+        if (!(is_rigid(M->fl, r) && M->closed[r] && is_round(M->fl, r))) continue;
+        RowsAlong normal = held_along(M, r);
+        if (sliding_with(M, r) >= 0 && held_by(M, r, r) <= SEIZED * taken_along(M->fl, normal, normal))
+            M->undecided = r;
     }
 }
 

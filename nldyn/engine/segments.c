@@ -269,6 +269,8 @@ static int touch(Motion *M, double here, int na)
     carry_depths(M, here);
     Trial trial;
     status = contact_panel(M, here, h_max, &trial);
+    if (status == CONTACT_FAILED && panel->round) find_seized(M, here);
+    if (M->undecided >= 0) return UNDECIDED;
     if (status != OK) return status;
     if (M->bonded && trial.h > 0.0) {
         double grown = growth_of_panel(fl, M->tab, panel) * trial.h;

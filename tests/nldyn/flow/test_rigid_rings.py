@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from nldyn import (
     ConstantForce,
@@ -490,6 +491,37 @@ def test_it_holds_a_weight_at_rest():
     x, y = rest(system) / ROOT
     assert (x, y) == pytest.approx((0.0, -1e-3), abs=1e-7)  # by a stiff spring in its place
     assert describe_stop(ring) == "rigid ring around 'x', 'y': restitution 0.5, clearance 0.001 m"
+
+
+@pytest.mark.parametrize(("angle", "at_once"), [(2.4, False), (2.9, True)])
+def test_a_force_that_friction_makes_endless_is_told(angle, at_once):
+    """With masses m along both directions and 0.9 m between them the normal n and the way t of the
+    friction have n M⁻¹ (n + μ t) = 0 at 163.18 degrees (μ = 2); the force grows up to there."""
+    mass, mu = np.array([[1.0, 0.9], [0.9, 1.0]]), 2.0
+    ring = RoundStop.rigid(("x", "y"), 0.5, 1e-3, friction=mu, surface_speed=1.0)
+    system = System.from_matrices(
+        mass, 1e3 * np.eye(2), PLANE, stops=[ring],
+        excitation=[HarmonicForce("x", 5.0), HarmonicForce("y", 5.0, phase_deg=-90.0)],
+    )  # fmt: skip
+    modes = sla.block_diag(*2 * [sla.eigh(1e3 * np.eye(2), mass)[1]])
+    n = np.array([math.cos(angle), math.sin(angle)])
+    start = np.linalg.solve(modes, [*(1e-3 * n), -0.3 * n[1], 0.3 * n[0]])
+    flow = FlowMap(system)
+    motion = flow.trajectory(flow.to_state(start[None]), PERIOD, 2.0 * np.pi * 40.0)
+    assert "Painlevé" in motion.failure
+    assert (motion.record.used == 0) is at_once
+    if at_once:
+        return
+    x, y = (modes @ flow.to_modal(motion.record.start[-1]))[:2]
+    a = brentq(
+        lambda a: (
+            np.array([math.cos(a), math.sin(a)])
+            @ np.linalg.inv(mass)
+            @ np.array([math.cos(a) - mu * math.sin(a), math.sin(a) + mu * math.cos(a)])
+        ),
+        2.4, 2.9,
+    )  # fmt: skip
+    assert math.atan2(y, x) == pytest.approx(a, abs=1e-5)
 
 
 @pytest.mark.parametrize(
