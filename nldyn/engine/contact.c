@@ -34,9 +34,9 @@ static bool leaves_circle(const Flow *fl, const Panel *panel)
     for (int a = 0; a < panel->na; a++) {
         int s = panel->active[a];
         if (!is_round(fl, s) || !is_rigid(fl, s)) continue;
-        const double *x = panel->output + (size_t)a * m;
-        const double *y = panel->output + (size_t)partner_of(fl, panel, a) * m;
-        double radius = stop_of(fl, s)->gap;
+        int other = partner_of(fl, panel, a);
+        const double *x = panel->output + (size_t)a * m, *y = panel->output + (size_t)other * m;
+        double radius = hypot(panel->depth[a], panel->depth[other]); /* at the start */
         for (int i = 0; i < m; i++)
             if (!(fabs(hypot(x[i], y[i]) - radius) <= ELSEWHERE * radius)) return true;
     }

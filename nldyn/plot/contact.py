@@ -17,6 +17,7 @@ from nldyn.base.errors import (
     numbers,
     shown,
 )
+from nldyn.flow.rigid_impacts import rigid_impacts, rubbed
 from nldyn.orbits.orbit import Orbit
 from nldyn.plot.diagram import PERIOD_COLOURS, new_axes, orbit_title
 from nldyn.plot.words import unit_in
@@ -175,10 +176,16 @@ def plot_wear_around(orbit: Orbit, stop: int, ax: Axes | None = None) -> Axes:
         raise SystemModelError(f"stops[{stop}] is no round clearance with friction")
     count = INSTANTS * orbit.period
     phases = 2.0 * np.pi * orbit.period * np.arange(count) / count
-    at = system.round_polar(ring, orbit.states(phases))
-    pressed = np.where(at.depth > 0.0, ring.force(np.maximum(at.depth, 0.0), at.rate), 0.0)
+    states = orbit.states(phases)
+    at, pressed = system.round_polar(ring, states), orbit.history_at(phases, states).force[:, stop]
     lost = ring.friction * pressed * np.abs(at.sliding) * orbit.duration / count
-    angles = np.degrees(np.arctan2(at.normal[:, 1], at.normal[:, 0]))
+    normals = at.normal
+    if ring.impulsive:
+        hits = rigid_impacts(orbit.trajectory, stop)
+        lost = np.concatenate([lost, ring.friction * rubbed(ring.friction, hits)])
+        hit = system.round_polar(ring, orbit.states(hits.phase)).normal
+        normals = np.concatenate([normals, hit])
+    angles = np.degrees(np.arctan2(normals[:, 1], normals[:, 0]))
     values, edges = np.histogram(angles, bins=SECTORS, range=(-180.0, 180.0), weights=lost)
     factor, unit = unit_in("J", float(values.max()))
     ax = ax if ax is not None else new_axes(9.0, 4.0)

@@ -388,6 +388,57 @@ def test_random_motions_are_those_of_an_independent_integration(block, frictions
     assert turned > 0 or frictions == (0.0,)
 
 
+@pytest.mark.parametrize("seed", [2, 4])
+def test_two_rings_are_hit_and_rested_on_at_once(seed):
+    """The second ring is carried by the first place in one of them; impacts pass through both."""
+    rng, names, stops, rings = np.random.default_rng([641, seed]), {}, [], []
+    half, coupled = rng.normal(size=(4, 4)), 0.2 * rng.normal(size=(4, 4))
+    M = np.diag(rng.uniform(0.5, 2.0, 4)) + coupled @ coupled.T
+    K = half @ half.T * 1e3 + np.diag(rng.uniform(2e3, 1e4, 4))
+    C = 0.002 * K + np.diag(rng.uniform(1.0, 5.0, 4))
+    across = np.eye(4)[2:] - (np.eye(4)[:2] if rng.random() < 0.5 else 0.0)
+    for k, rows in enumerate((np.eye(4)[:2], across)):
+        c, way = rng.uniform(0.5e-3, 1e-3), 6.28 * rng.random()
+        away = 0.5 * c * rng.random()
+        centre = (away * math.cos(way), away * math.sin(way))
+        e = float(rng.choice([0.0, 0.3, 0.6, 0.9]))
+        mu, surface = float(rng.choice([0.0, 0.2, 0.5])), float(rng.choice([-0.05, 0.0, 0.02, 0.3]))
+        names |= {f"x{k}": rows[0], f"y{k}": rows[1]}
+        stops.append(
+            RoundStop.rigid(
+                (f"x{k}", f"y{k}"), e, c, eccentricity=centre, friction=mu, surface_speed=surface
+            )
+        )
+        rings.append(RigidRing(rows, e, c, centre, 1.0, mu, stops[-1].sliding_speed))
+    w, f = 2.0 * np.pi * rng.uniform(5.0, 40.0), rng.uniform(5.0, 25.0, size=4)
+    system = System.from_matrices(
+        M, K, names, damping=C, stops=stops,
+        excitation=[
+            HarmonicForce("x0", f[0]), HarmonicForce("y0", f[1], phase_deg=-90.0),
+            ConstantForce("x1", f[2]), HarmonicForce("y1", f[3], phase_deg=30.0),
+        ],
+    )  # fmt: skip
+    vectors = np.array(list(names.values()))
+
+    def pushed(t):
+        at = [math.cos(w * t), math.sin(w * t), 1.0, math.cos(w * t + np.pi / 6.0)]
+        return vectors.T @ (f * at)
+
+    rotor = RigidRotor(M, C, K, pushed, rings)
+    start = np.concatenate([1e-4 * rng.normal(size=4), 0.1 * rng.normal(size=4)])
+    end = rotor.followed(start, 2.0 * np.pi / w, 2.0 * np.pi / w / 400)
+    modes = sla.eigh(K, M)[1]
+    basis, flow = sla.block_diag(modes, modes), FlowMap(system)
+    z = flow.to_state(np.linalg.solve(basis, start))[None]
+    found = flow.shoot(z, PERIOD, w)
+    assert rotor.hits > 20 and rotor.rested * w > 0.4 * 2.0 * np.pi and rotor.turned > 0
+    ours = basis @ flow.to_modal(found.ends[0])
+    assert ours[:4] == pytest.approx(end[:4], abs=1e-8 * np.abs(end[:4]).max())
+    assert ours[4:] == pytest.approx(end[4:], abs=1e-8 * np.abs(end[4:]).max())
+    step = 1e-8 * float(np.abs(z).max())
+    assert off_differences(flow, found, z, PERIOD, w, step) < 1e-6
+
+
 @pytest.mark.parametrize("seed", [4, 10])
 def test_derivatives_by_its_numbers_are_those_of_differences(seed):
     system, _, w, start, basis = random_system(seed, FRICTIONS, SURFACES)
