@@ -16,6 +16,8 @@ from cms.reduction.model import ReducedModel
 from cms.reduction.residual import DEPENDENCE_TOLERANCE, ResidualModes, without_modes
 from cms.solvers.eigen import Shifted
 
+FEW = 8  # interfaces that are named one by one
+
 
 def massless_boundary(
     pencil: Pencil, shifted: Shifted, modes: FloatArray, extra: ResidualModes, names: Sequence[str]
@@ -61,10 +63,16 @@ def with_flexibility(model: ReducedModel, pencil: Pencil, shapes: FloatArray) ->
     return replace(model, residual_flexibility=flexibility, residual_shapes=shapes)
 
 
-def check_massless(
+def massless_names(
     massless: Sequence[str], method: str, names: Sequence[str], areas: Mapping[str, Area]
-) -> None:
-    """Raise ReductionError unless a massless boundary can be of these interfaces."""
+) -> list[str]:
+    """Interfaces of a massless boundary, of which areas may be named for all of their points.
+
+    Raises
+    ------
+    ReductionError
+        If it cannot be of these interfaces.
+    """
     if method != "macneal":
         raise ReductionError(f"massless is for method 'macneal', not '{method}'")
     if isinstance(massless, str):
@@ -72,17 +80,23 @@ def check_massless(
     if not massless:
         raise ReductionError("massless names no interface: without any it is method 'rubin'")
     points = {point: area for area, of in areas.items() for point in of.points}
+    found: list[str] = []
     for name in massless:
+        if name in areas:
+            found += areas[name].points
+            continue
         if name not in names:
             known = ", ".join(names) or "none"
             raise ReductionError(f"massless: there is no interface '{name}' (there are: {known})")
         if name in points:
             raise ReductionError(
-                f"massless: '{name}' is a point of area '{points[name]}', whose points share "
-                "attachment modes with mass"
+                f"massless: '{name}' is a point of area '{points[name]}': name the area, whose "
+                "points have mass together or none"
             )
-    if len(set(massless)) < len(massless):
+        found.append(name)
+    if len(set(found)) < len(found):
         raise ReductionError("massless names an interface twice")
+    return found
 
 
 def told_of_massless(reduced: ReducedModel) -> list[str]:
@@ -94,7 +108,8 @@ def told_of_massless(reduced: ReducedModel) -> list[str]:
     bare = [name for name, size in zip(reduced.interfaces, own, strict=True) if size > 0.0]
     share = np.abs(G) / np.where(np.outer(own, own) > 0.0, np.outer(own, own), 1.0)
     most = 100.0 * float(np.max(share - np.diag(np.diag(share))))
+    told = ", ".join(bare) if len(bare) <= FEW else f"{len(bare)}, '{bare[0]}' to '{bare[-1]}'"
     return [
-        f"interfaces without mass: {', '.join(bare)}"
+        f"interfaces without mass: {told}"
         + (f"; of what has none at most {most:.2g} % is common to two" if len(bare) > 1 else "")
     ]

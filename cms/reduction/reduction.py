@@ -23,8 +23,8 @@ from cms.component.component import (
 )
 from cms.reduction.area import Area
 from cms.reduction.boundary import (
-    check_massless,
     massless_boundary,
+    massless_names,
     told_of_massless,
     with_flexibility,
 )
@@ -116,9 +116,10 @@ def reduce(
         static deflection needs, told in the model's ``areas``; the component's own ``areas`` unless
         given. For "rubin" and "craig-chang"; by fixed-interface methods each point has its own.
     massless : sequence of str, optional
-        Of "macneal": the interfaces whose residual modes have no mass, all unless given; the others
-        have theirs as by "rubin". A rigid or linear stop of `nldyn` at such a massless boundary
-        converges with the modes [7]_; loads act on interfaces with mass.
+        Of "macneal": the interfaces, or areas for all of their points, whose residual modes have no
+        mass, all unless given; the others have theirs as by "rubin". A rigid or linear stop of
+        `nldyn` at such a massless boundary converges with the modes [7]_; loads act on interfaces
+        with mass.
     progress : callable, optional
         Called as ``progress(text)`` with what is to be done, how much memory it needs, and which
         solver does it.
@@ -182,7 +183,8 @@ def reduce(
     check_count(modes, method, pencil)
     shared = getattr(component, "areas", {}) if areas is None else areas
     if massless is not None:
-        check_massless(massless, method, pencil.names, shared)
+        massless = massless_names(massless, method, pencil.names, shared)
+        shared = {name: area for name, area in shared.items() if area.points[0] not in massless}
     if method in FIXED and not pencil.names:
         raise ReductionError(f"method '{method}' needs an interface, and the component has none")
     free = partial(reduced_free, areas=shared, massless=massless)

@@ -173,6 +173,8 @@ def describe_area(system: System, name: str) -> str:
     first, gaps = stops[0], sorted({stop.gap for stop in stops})
     unit = "N/m" + ("" if first.exponent == 1.0 else f"^{first.exponent:g}")
     total = sum(stop.stiffness for stop in stops)
+    if first.exponent == 1.0:
+        total = system.coupled.whole_stiffness(system.areas[name])
     told = f"contact area '{name}': {len(stops)} points, {total:.6g} {unit} in all, "
     told += f"gap {gaps[0]:g} m" if len(gaps) == 1 else f"gaps {gaps[0]:g} to {gaps[-1]:g} m"
     told += f", dissipation {first.dissipation:g} s/m" if first.dissipation else ""

@@ -14,6 +14,7 @@
 
 #define MOST_PIVOTS 50      /* after which their rounding is left behind */
 #define PIVOTS_PER_STOP 100 /* in the search for the closed ones, at most */
+#define LEAST 0.1 /* of a mobility alone: guesses need one, and others' forces may make up for it */
 
 static bool any_coupled(const Flow *fl) { return fl->give != NULL; }
 
@@ -65,8 +66,10 @@ static void pivot(const Flow *fl, int stop)
         if (a != stop && fl->coupled[a])
             combine_stop(fl, a, 1.0, k * fl->give[(size_t)a * n + stop], stop);
     for (int a = 0; a < n; a++)
-        if (fl->coupled[a])
-            fl->own_stops[(size_t)a * fl->n_columns + MOBILITY] = between(fl, a, a);
+        if (fl->coupled[a]) {
+            size_t place = (size_t)a * fl->n_columns + MOBILITY;
+            fl->own_stops[place] = larger(between(fl, a, a), LEAST * fl->plain->stops[place]);
+        }
     fl->counted[stop] = !fl->counted[stop];
     ++*fl->pivots;
 }

@@ -218,6 +218,13 @@ static void guess_outputs(const Flow *fl, const Gauss *tab, double phase, const 
     if (is_round(fl, stop)) guess_round(fl, tab, phase, w, choice, a, panel);
 }
 
+/* length of a panel that resolves the fastest swing on coupled stops */
+static double longest_coupled(const Flow *fl, const Gauss *tab, const Panel *panel)
+{
+    double fastest = sqrt(coupled_stiffness(fl, panel));
+    return fastest > 0.0 ? MAPPED * fl->node_angle * panel->m / (tab->power * fastest) : INFINITY;
+}
+
 /* Choose the kind and length of a panel and guess its penetrations; h bounds the length, h_mapped
  * that of a panel that is to end with a release. A contact is covered by two panels, so that no
  * panel has to resolve more than a quarter wave. */
@@ -225,10 +232,10 @@ static Choice guess_panel(const Flow *fl, const Gauss *tab, double phase, const 
                           double h, double h_mapped, int start_switch, Panel *panel)
 {
     bool ends = false;
-    double length = h;
+    double length = smaller(h, longest_coupled(fl, tab, panel));
     for (int a = 0; a < panel->na; a++) {
         int stop = panel->active[a];
-        if (!is_elastic(fl, stop)) continue;
+        if (!is_elastic(fl, stop) || is_coupled(fl, stop)) continue;
         Impact hit = expected_contact(fl, stop, w, phase);
         Value out = creep(fl, stop, w, phase, hit.duration);
         double most = hit.left;

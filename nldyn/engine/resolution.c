@@ -121,14 +121,29 @@ static double response_tail(const Flow *fl, const Gauss *tab, int stop, const do
     return worst / mobility;
 }
 
+/* bound of the square of the fastest swing on the closed coupled stops: eigenvalues λ of what their
+ * forces make of accelerations are real, and none is above √Σλ² */
+static double coupled_stiffness(const Flow *fl, const Panel *panel)
+{
+    double total = 0.0;
+    for (int a = 0; a < panel->na && any_coupled(fl); a++)
+        for (int b = 0; b < panel->na; b++) {
+            int s = panel->active[a], other = panel->active[b];
+            if (!is_coupled(fl, s) || !is_coupled(fl, other)) continue;
+            total += stop_of(fl, s)->stiffness * between(fl, s, other) *
+                     stop_of(fl, other)->stiffness * between(fl, other, s);
+        }
+    return sqrt(larger(total, 0.0));
+}
+
 /* whether the stiffness of the closed stops sways too fast for a panel: a force that hardly
  * changes tells nothing of how a change of the motion sways on them, so it is held to the bound of
  * the structure's fastest mode */
 static bool sways_unseen(const Flow *fl, const Gauss *tab, int kind, double h, const Panel *panel)
 {
-    double stiffness = 0.0;
+    double stiffness = coupled_stiffness(fl, panel);
     for (int a = 0; a < panel->na; a++)
-        if (!is_held(fl, panel->active[a]))
+        if (!is_held(fl, panel->active[a]) && !is_coupled(fl, panel->active[a]))
             stiffness += stop_of(fl, panel->active[a])->mobility *
                          largest(piece_row(panel->slope, a, panel->m), panel->m);
     double longest = fl->node_angle * panel->m * (kind == 0 ? 1.0 : MAPPED / tab->power);

@@ -538,6 +538,13 @@ def _check_areas(scene: Scene, report: Report) -> None:
         if scene.reduction is not None and scene.reduction.tolerance is not None:
             fault = "does not go with reduction.tolerance; give 'modes' or 'cutoff_hz'"
             raise report(key, fault)
+        named = () if scene.reduction is None else scene.reduction.massless
+        if area.law == "rigid" and area.called not in named:
+            fault = (
+                'is rigid, which needs points without mass: method = "macneal" and '
+                f"massless = ['{area.called}'] in [reduction]"
+            )
+            raise report(("contact_areas", number, "law"), fault)
 
 
 def _check_planes(scene: Scene, report: Report) -> None:
@@ -555,9 +562,7 @@ def _check_planes(scene: Scene, report: Report) -> None:
         for other in others:
             first = known.get(other)
             if first is not None and second is not None and first.direction == second.direction:
-                fault = (
-                    f"lies along '{first.direction}' as '{other}', and must be perpendicular"
-                )
+                fault = f"lies along '{first.direction}' as '{other}', and must be perpendicular"
                 raise report(("friction", number, "second_tangent"), fault)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -17,6 +18,7 @@ from nldyn.scene.messages import scene_error
 from nldyn.scene.schema.contacts import ALONG, ListedAreaTable, MeshAreaTable, exponent_of
 from nldyn.scene.schema.scene import Scene
 from nldyn.system.contact_area import contact_area, gap_beside
+from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.stop import Stop
 
 FAULTS = (fem.ModelError, cms.ReductionError, SystemModelError)
@@ -80,7 +82,7 @@ class _End:
         Along a surface that gives way they share attachment modes with those along the normal.
         """
         named = dict(zip(self.names(), self.points.vectors(), strict=True))
-        stiffness = [table.stiffness * self.points.weights]
+        stiffness = [(table.stiffness or 1.0) * self.points.weights]
         shared = list(named)
         for word, axis in _tangents(table):
             rows = self.points.vectors(_axis(axis))
@@ -273,9 +275,9 @@ def _beside(found: Found) -> list[str]:
     return told
 
 
-def area_stops(scene: Scene) -> tuple[Stop, ...]:
+def area_stops(scene: Scene) -> tuple[Stop | RigidStop, ...]:
     """The stops of all areas of contact of a scene."""
-    stops: list[Stop] = []
+    stops: list[Stop | RigidStop] = []
     names: set[str] = set()
     tables = zip(scene.contact_areas, areas_found(scene), strict=True)
     for number, (table, found) in enumerate(tables):
@@ -289,7 +291,7 @@ def area_stops(scene: Scene) -> tuple[Stop, ...]:
             stops += contact_area(
                 table.called,
                 points,
-                table.stiffness,
+                math.inf if table.stiffness is None else table.stiffness,
                 weights=found.weights,
                 exponent=exponent_of(table),
                 gap=found.gaps,

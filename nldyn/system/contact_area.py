@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_types, numbers
 from nldyn.system.friction import Friction
+from nldyn.system.rigid_stop import RigidStop
 from nldyn.system.stop import Stop
 
 
@@ -32,7 +34,7 @@ def contact_area(
     tangential_stiffness: float | None = None,
     second_tangents: Sequence[str] | None = None,
     second_tangents_against: Sequence[str] | None = None,
-) -> tuple[Stop, ...]:
+) -> tuple[Stop | RigidStop, ...]:
     r"""Stops at the points of a face or an edge, with one law of the pressure among them.
 
     The pressure is :math:`p = k\,\delta^p (1 + a\dot\delta) + c\,\dot\delta` per area, or per
@@ -47,6 +49,7 @@ def contact_area(
         Interfaces of the points, along the normal of the area.
     stiffness : float
         k in N/m^p per m² of an area, or per m of an edge; without weights N/m^p at each point.
+        ``math.inf`` for rigid contact, at points without mass: a massless boundary.
     weights : (n,) array_like, optional
         Areas in m², or lengths in m, that the points stand for; node by node, without, they are 1.
     exponent : float
@@ -70,14 +73,14 @@ def contact_area(
 
     Returns
     -------
-    tuple of Stop
+    tuple of Stop or RigidStop
         To be given among the stops of a `System`.
 
     Raises
     ------
     SystemModelError
-        For no points, lists that are not of one length, a weight that is not positive; else as
-        `Stop`.
+        For no points, lists that are not of one length, a weight that is not positive, or rigid
+        contact with what only a law has; else as `Stop`.
 
     Examples
     --------
@@ -108,6 +111,20 @@ def contact_area(
     ]
     if not np.all(shares > 0.0):
         raise SystemModelError(f"{owner}: weights must be positive, got {shares.min():g}")
+    if stiffness == math.inf:
+        given = (dissipation, dashpot, tangential_stiffness, second_tangents)
+        if exponent != 1.0 or any(given):
+            raise SystemModelError(
+                f"{owner}: rigid contact has no exponent, dissipation, dashpot, tangential "
+                "stiffness nor second tangents"
+            )
+        along, beside = others[1:3]
+        return tuple(
+            RigidStop(at, 1.0, each, direction, other, tangent, friction, under, name, share)
+            for at, share, each, other, tangent, under in zip(
+                points, shares.tolist(), gaps.tolist(), others[0], along, beside, strict=True
+            )
+        )
     return tuple(
         Stop(
             at,

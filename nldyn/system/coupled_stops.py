@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -39,6 +40,8 @@ class CoupledStops:
     >>> pair = CoupledStops(np.array([[0.0, 0.5], [0.5, 0.0]]), np.array([1.0, 1.0]))
     >>> pair.penetrations(np.array([[1.0, 0.2], [3.0, 3.0]])).tolist()
     [[1.0, -0.3], [2.0, 2.0]]
+    >>> round(pair.whole_stiffness([0, 1]), 9)
+    1.333333333
     """
 
     common: Real
@@ -54,6 +57,12 @@ class CoupledStops:
     def involves(self, stop: int) -> bool:
         """Whether others move a stop at once."""
         return bool(self._moved[stop])
+
+    def whole_stiffness(self, places: Sequence[int]) -> float:
+        """Stiffness of linear stops that are penetrated alike, in N/m."""
+        of = np.asarray(places, dtype=np.intp)
+        give = self.common[np.ix_(of, of)] + np.diag(1.0 / self.stiffness[of])
+        return float(np.linalg.solve(give, np.ones(of.size)).sum())
 
     def together(self, closed: Flags) -> Real:
         """What maps y to δ while some stops are closed, (n, n)."""

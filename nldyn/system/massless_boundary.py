@@ -189,16 +189,16 @@ class MasslessBoundary:
         return Stop(
             stop.at, 1.0 / give, 1.0, stop.gap, stop.direction, stop.against,
             tangent=stop.tangent, friction=stop.friction, tangent_against=stop.tangent_against,
-            tangential_stiffness=spring,
+            tangential_stiffness=spring, area=stop.area, share=stop.share,
         )  # fmt: skip
 
     @staticmethod
     def _series(stop: Stop, give: float) -> float:
         """Stiffness of a linear stop in series with a flexibility."""
-        if not stop.is_linear or stop.law or stop.dashpot or stop.dissipation or stop.area:
+        if not stop.is_linear or stop.law or stop.dashpot or stop.dissipation:
             raise SystemModelError(
                 f"stop at '{stop.at}', which has no mass: only a rigid stop or a linear one "
-                "without a loss can act there, and no area; reduce by 'rubin' for others"
+                "without a loss can act there; reduce by 'rubin' for others"
             )
         return 1.0 / (1.0 / stop.stiffness + give)
 

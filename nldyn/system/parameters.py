@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from nldyn.base.arrays import SLACK
 from nldyn.base.errors import SystemModelError, check_types, check_whole
 from nldyn.system.loads import Excitation
 from nldyn.system.round_stop import RoundStop
@@ -117,6 +118,12 @@ def check_exact(system: System, parameter: Parameter) -> None:
             raise SystemModelError(
                 f"parameter '{name}': area '{points[0].area}' has a law of its own, which knows no "
                 "stiffness"
+            )
+        each = [stop.stiffness / stop.share for stop in points]
+        if name == "area_stiffness" and max(each) - min(each) > SLACK * max(each):
+            raise SystemModelError(
+                f"parameter '{name}': the points of area '{points[0].area}' have no mass, so that "
+                "the stiffness of each is in series with what gives way at once"
             )
     elif name in OF_ROUND:
         check_index(parameter, "stop", len(system.stops))

@@ -55,6 +55,8 @@ class RigidStop:
         Interface on the other side; the ground unless given.
     tangent, friction, tangent_against : optional
         As for a `Stop`. The coefficient is one, at rest and sliding.
+    area, share
+        As for a `Stop`: of a point of an area of contact, which must have no mass.
 
     Raises
     ------
@@ -83,6 +85,8 @@ class RigidStop:
     tangent: str | None = None
     friction: Friction | float | None = None
     tangent_against: str | None = None
+    area: str | None = None
+    share: float = 1.0
     impulsive: ClassVar[bool] = True
     sharp: ClassVar[bool] = True
     jumps: ClassVar[bool] = True

@@ -1040,6 +1040,11 @@ class System:
             if isinstance(stop, RoundStop):
                 self._check_rigid_ring(stop)
                 continue
+            if stop.area is not None:
+                raise SystemModelError(
+                    f"contact area '{stop.area}' is rigid, but its points have mass: name it in "
+                    "massless = [...] of method 'macneal', or give it a stiffness"
+                )
             if not isinstance(stop.friction, Friction) or stop.tangent is None:
                 continue
             if stop.friction.adhesion:

@@ -250,6 +250,11 @@ class RoundClearanceTable(Table):
         )  # fmt: skip
 
 
+ONLY_ELASTIC = (
+    *("stiffness", "dissipation", "dashpot", "pulls", "tangential_stiffness", "second_along"),
+)
+
+
 class ContactAreaTable(Table):
     """``[[contact_areas]]``: [a face or an edge that touches](../how-to/contact_areas.md)."""
 
@@ -258,11 +263,13 @@ class ContactAreaTable(Table):
     or a list of interfaces."""
     name: str = ""
     """What reports call it; `at` unless given."""
-    stiffness: Positive
-    """[N/m^exponent per m², m or point] Stiffness of the contact: per area of a face, per length of
-    an edge or of beams; at each point node by node, or of a list without `weights`."""
-    law: Literal["linear", "hertz"] = "linear"
-    """`"linear"` for a foundation that lifts off, or `"hertz"` for a power of the penetration."""
+    stiffness: Positive | None = None
+    """[N/m^exponent per m², m or point] Stiffness of the contact, needed unless it is rigid: per
+    area of a face, per length of an edge or of beams; at each point node by node, or of a list
+    without `weights`."""
+    law: Literal["linear", "hertz", "rigid"] = "linear"
+    """`"linear"` for a foundation that lifts off, `"hertz"` for a power of the penetration, or
+    `"rigid"` where `massless` names the area."""
     exponent: Annotated[float, Field(ge=1, le=LARGEST_EXPONENT)] | None = None
     """Exponent of the law `"hertz"`, from 1 to 4; 1.5 unless given."""
     gap: Number | Annotated[list[Number], Field(min_length=1)] = 0.0
@@ -290,8 +297,12 @@ class ContactAreaTable(Table):
 
     @model_validator(mode="after")
     def _one_law(self) -> Self:
-        if self.law == "linear":
-            refuse(self, ("exponent",), "law 'linear'")
+        if self.law != "hertz":
+            refuse(self, ("exponent",), f"law '{self.law}'")
+        if self.law == "rigid":
+            refuse(self, ONLY_ELASTIC, "law 'rigid'")
+        elif self.stiffness is None:
+            raise ValueError("needs a 'stiffness', or the law 'rigid'")
         if (self.friction is None) != (self.along is None):
             raise ValueError("needs both 'friction' and 'along', or neither")
         if self.along is None and self.tangential_stiffness is not None:
@@ -393,4 +404,4 @@ AnyAreaTable = Annotated[
 
 def exponent_of(table: RoundClearanceTable | ContactAreaTable) -> float:
     """Exponent of the law of a contact."""
-    return 1.0 if table.law == "linear" else table.exponent or 1.5
+    return table.exponent or 1.5 if table.law == "hertz" else 1.0

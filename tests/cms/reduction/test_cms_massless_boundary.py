@@ -104,6 +104,19 @@ def test_a_boundary_that_cannot_be_is_refused(asked, sentence):
         cms.reduce(whole, **{"modes": 5, "method": "macneal", **asked})
 
 
+def test_an_area_is_named_for_all_of_its_points():
+    """As if each were: none of them shares attachment modes with mass any more."""
+    whole, pad = chain(40, interfaces=PLACES), cms.Area(["tip", "near"], [1.0, 1.0])
+    told = []
+    named = cms.reduce(
+        whole, modes=5, method="macneal", massless=["pad"], areas={"pad": pad}, progress=told.append
+    )
+    single = cms.reduce(whole, modes=5, method="macneal", massless=["tip", "near"])
+    assert named.areas == {} and named.size == single.size
+    np.testing.assert_array_equal(named.residual_flexibility, single.residual_flexibility)
+    assert any("interfaces without mass: tip, near" in sentence for sentence in told)
+
+
 def test_no_bound_is_claimed_where_some_have_mass():
     whole = chain(40, interfaces=PLACES)
     reduced = cms.reduce(whole, modes=5, method="macneal", massless=["tip"])
