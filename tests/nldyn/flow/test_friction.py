@@ -147,6 +147,12 @@ def test_random_systems_whose_friction_drops_at_once_agree(seed):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 7, 15, 20, 25, 27, 33, 41, 49])  # none begins beyond its wall
+def test_impacts_on_rigid_stops_turn_what_slides_with_a_drop_at_once(seed):
+    agrees(seed, walled=True, drops=True)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10, 50))
 def test_more_random_systems_whose_friction_drops_at_once_agree(seed):
     agrees(seed, drops=True)
