@@ -388,6 +388,19 @@ def test_random_motions_are_those_of_an_independent_integration(block, frictions
     assert turned > 0 or frictions == (0.0,)
 
 
+@pytest.mark.parametrize("seed", [0, 4, 6])
+def test_an_impact_changes_volumes_by_the_square_of_the_restitution(seed):
+    """Liouville: beside that the damping alone does, whatever the masses along both directions."""
+    system, _, w, start, basis = random_system(seed)
+    flow = FlowMap(system)
+    found = flow.shoot(flow.to_state(np.linalg.solve(basis, start))[None], PERIOD, w)
+    assert found.closings[0] >= 2
+    lost = 2 * found.closings[0] * math.log(system.stops[0].restitution)
+    sign, volume = np.linalg.slogdet(found.jacobians[0])
+    damped = -np.trace(system.damping) * 2.0 * np.pi / w
+    assert (sign, volume) == pytest.approx((1.0, damped + lost), abs=1e-11)
+
+
 @pytest.mark.parametrize("seed", [2, 4])
 def test_two_rings_are_hit_and_rested_on_at_once(seed):
     """The second ring is carried by the first place in one of them; impacts pass through both."""
