@@ -19,6 +19,7 @@ from nldyn.bifurcations.branch_crossing import SHORTEST_CROSSING
 from nldyn.bifurcations.codimension_two import is_torus, is_torus_curve
 from nldyn.bifurcations.corners import CORNER_STEP, MEETS, corner_ahead, extremes_meet
 from nldyn.bifurcations.just_sticking import just_sticks
+from nldyn.bifurcations.last_slip import LEAST, LITTLE, last_slip
 from nldyn.bifurcations.on_curve import FARTHEST_NODE, on_chart_plane, on_plane
 from nldyn.bifurcations.period_doubling import flip_between, passed_flip
 from nldyn.bifurcations.point import BranchNode, place_of
@@ -187,8 +188,8 @@ class Stepper:
         """The last points of the walk if it ends in this step, and why."""
         for ends in (
             self._leaves_range, self._dissolves, self._meets_half_period, self._becomes_neutral,
-            self._vanishes, self._shrinks, self._grazes, self._closed, self._came_back,
-            self._meets_open_end,
+            self._vanishes, self._shrinks, self._grazes, self._ceases_to_slide, self._closed,
+            self._came_back, self._meets_open_end,
         ):  # fmt: skip
             last = ends(here, there)
             if last is not None:
@@ -241,6 +242,8 @@ class Stepper:
             slider = just_sticks(here.orbit)
             if slider is not None:
                 return Ending.JUST_STICKS.told(at=slider.at, place=place_of(here, 9))
+            if self._ceases_to_slide(here, here, LITTLE) is not None:
+                return self.stop_reason
         return Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
 
     def begin_anew(self, here: BranchNode, step: float) -> None:
@@ -531,6 +534,20 @@ class Stepper:
         if not grazes_rigid(there.orbit, 0.0, self._slightest, there.condition):
             return None
         self.stop_reason = _at_grazing(there)
+        return [there]
+
+    def _ceases_to_slide(
+        self, _: BranchNode, there: BranchNode, least: float = LEAST
+    ) -> list[BranchNode] | None:
+        """A motion that all but sticks all the time, of which less and less is left."""
+        if len(there.family.charts) > 1 or not there.orbit.system.rubbing:
+            return None
+        found = last_slip([*self.visited, there], least)
+        if found is None:
+            return None
+        slider, limit = found
+        place = told_value(there.parameter, limit, digits=6)
+        self.stop_reason = Ending.STICKS.told(at=slider.at, place=place)
         return [there]
 
     def _closed(self, here: BranchNode, there: BranchNode) -> list[BranchNode] | None:

@@ -57,6 +57,10 @@ class Ending(Enum):
         "what slides at '{at}' just comes to rest at {place}: friction drops at once, so that "
         "motions beyond it are not alike"
     )
+    STICKS = (
+        "what slides at '{at}' slides less and less, up to none at all: from near {place} on it "
+        "sticks all the time"
+    )
     FAILS = "what lies beyond {place} could not be computed: {obstacle}"
     MOST_POINTS = "{points} points"
     SHORT_STEP = "step below {step}: {obstacle}"

@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from nldyn.bifurcations.self_excited import GRAZING_SLIDING
+from nldyn.branches.endings import Ending
 from nldyn.plot.diagram import are_limit_cycles, branch_curve, stability_runs
 from nldyn.plot.words import FORCES, Along, unit_in
 from nldyn.system.naming import slider_name, stop_name
@@ -57,9 +58,15 @@ def answer_lines(diagram: Diagram, special_points: Table) -> list[str]:
         *_area_lines(nodes, along),
         *_friction_lines(nodes, along),
         f"stable and periodic: {_listed(stable, along)}",
-        f"ranges where {found} was found: {unstable}",
+        "; ".join([f"ranges where {found} was found: {unstable}", *_stuck(diagram.branches)]),
         f"jumps: {jumps_line(diagram.branches, special_points, along)}",
     ]
+
+
+def _stuck(branches: Iterable[Branch]) -> list[str]:
+    """From where on something sticks all the time, of which no branch goes on."""
+    reasons = [reason for branch in branches for reason in branch.stop_reasons]
+    return list(dict.fromkeys(str(r) for r in reasons if r.ending is Ending.STICKS))
 
 
 def _peak_line(nodes: Sequence[BranchNode], along: Along, observe: str) -> str:

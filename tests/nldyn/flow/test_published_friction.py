@@ -1,6 +1,7 @@
 """Published cases of dry friction: J. P. Den Hartog's block, and code_aster's SDND100, 102, 104."""
 
 import math
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -15,12 +16,16 @@ from nldyn import (
     RigidStop,
     Stop,
     System,
+    Unbalance,
     continue_branch,
     solve_orbit,
 )
 from nldyn.bifurcations.just_sticking import just_sticks
 from nldyn.branches.endings import Ending
 from nldyn.flow.sliding import slider_measures
+from nldyn.report.answer import answer_lines
+from nldyn.report.results import tables_of
+from nldyn.search.diagram import Diagram
 from nldyn.system import DryFriction, Friction
 
 TURN = 2.0 * math.pi
@@ -125,6 +130,40 @@ def test_motions_with_one_stop_a_cycle_end_where_that_takes_no_time():
     assert just_sticks(last) is not None
     assert just_sticks(branch.points[len(branch.points) // 2]) is None
     assert just_sticks(solve_orbit(block(0.4, 0.8), 0.7 / TURN)) is None
+
+
+def test_a_block_slides_up_to_where_the_whole_force_is_friction():
+    """From μN = P on it never slips, wherever it lies within its friction."""
+    branch = continue_branch(solve_orbit(block(0.9), 0.3 / TURN), (0.9, 1.5), parameter="friction")
+    (reason,) = (each for each in branch.stop_reasons if each.ending is Ending.STICKS)
+    assert reason.values == {"at": "x", "place": "friction = 1"}
+    assert not reason.broken_off
+    assert branch.values.max() < 1.0
+    found = Diagram((branch,), (0.9, 1.5), "x", parameter=branch.parameter)
+    *_, missing, _ = answer_lines(found, tables_of(found)["special_points"])
+    assert "nothing stable" in missing and missing.endswith(reason)
+
+
+@pytest.mark.parametrize(("mu", "ratio"), [(0.5, math.sqrt(0.5)), (0.9, math.sqrt(0.9))])
+def test_a_block_slides_down_to_where_the_force_of_an_unbalance_is_its_friction(mu, ratio):
+    pushed = replace(block(mu, damping=0.1), excitation=[Unbalance("x", 1.0)])
+    branch = continue_branch(solve_orbit(pushed, 1.2 / TURN), (0.2 / TURN, 1.2 / TURN))
+    (reason,) = (each for each in branch.stop_reasons if each.ending is Ending.STICKS)
+    assert float(reason.values["place"].split()[0]) == pytest.approx(ratio / TURN, rel=1e-5)
+
+
+def test_what_sticks_in_series_with_a_mass_is_a_clamp_for_it():
+    """The force of the spring between x, which has friction, and y, with x held."""
+    stiffness = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    system = System.from_matrices(
+        np.eye(2), stiffness, {"x": [1.0, 0.0], "y": [0.0, 1.0]}, damping=0.1 * np.eye(2),
+        dampers=[DryFriction("x", 1.0, 0.3)], excitation=[HarmonicForce("y", 1.0)],
+    )  # fmt: skip
+    omega = 0.75
+    branch = continue_branch(solve_orbit(system, omega / TURN), (0.2, 1.5), parameter="friction")
+    (reason,) = (each for each in branch.stop_reasons if each.ending is Ending.STICKS)
+    held = 1.0 / abs(complex(2.0 - omega**2, 0.1 * omega))
+    assert float(reason.values["place"].split()[-1]) == pytest.approx(held, rel=1e-5)
 
 
 @pytest.mark.parametrize(("ratio", "larger"), [(0.6, 1.2), (0.7, 1.2), (0.7, 2.0)])
