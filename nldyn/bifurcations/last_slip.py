@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import brentq
 
+from nldyn.base.arrays import Real
 from nldyn.bifurcations.point import BranchNode
 from nldyn.system.friction import Slider
 
@@ -42,7 +43,7 @@ def last_slip(path: Sequence[BranchNode], least: float = LEAST) -> tuple[Slider,
     return None
 
 
-def _limit(ways: np.ndarray, values: np.ndarray) -> float | None:
+def _limit(ways: Real, values: Real) -> float | None:
     """Where a power of the distance through the last of some ways and two before is zero."""
     last = len(ways) - 1
     places = [last]
@@ -60,7 +61,7 @@ def _limit(ways: np.ndarray, values: np.ndarray) -> float | None:
         near, middle, far = np.log(np.abs(x - values[places]) + beyond)
         return float((b - a) * (far - middle) - (c - b) * (middle - near))
 
-    ends = np.abs(x - y) * np.array([1e-6, FARTHEST])
-    if not off(ends[0]) * off(ends[1]) < 0.0:
+    nearest, farthest = (share * float(abs(x - y)) for share in (1e-6, FARTHEST))
+    if not off(nearest) * off(farthest) < 0.0:
         return None
-    return float(x + sense * brentq(off, *ends, xtol=1e-12 * ends[1]))
+    return float(x + sense * brentq(off, nearest, farthest, xtol=1e-12 * farthest))
