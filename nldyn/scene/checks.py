@@ -67,7 +67,7 @@ def check_scene(scene: Scene, file: Path) -> None:
     _check_interface_names(scene, report)
     _check_absolute(scene, report)
     _check_areas(scene, report)
-    _check_planes(scene, report)
+    _check_perpendicular(scene, report)
     _check_seeds(scene, report)
     _check_explore(scene, report)
 
@@ -547,23 +547,35 @@ def _check_areas(scene: Scene, report: Report) -> None:
             raise report(("contact_areas", number, "law"), fault)
 
 
-def _check_planes(scene: Scene, report: Report) -> None:
-    """Refuse second tangents that are not perpendicular to the first one and to the stop there."""
-    for number, table in enumerate(scene.friction):
-        if table.second_tangent is None:
-            continue
-        known = dict(scene.interfaces)
-        for part, component in scene.components.items():
-            known |= {f"{part}.{name}": each for name, each in component.interfaces.items()}
-        second = known.get(table.second_tangent)
-        others = [table.at]
-        if table.stop is not None and table.stop < len(scene.stops):
-            others.append(scene.stops[table.stop].at)
+def _check_perpendicular(scene: Scene, report: Report) -> None:
+    """Refuse tangents along the normal or each other, where directions are known."""
+    for key, name, others in _perpendicular(scene):
+        axis = scene.direction_at(name)
         for other in others:
-            first = known.get(other)
-            if first is not None and second is not None and first.direction == second.direction:
-                fault = f"lies along '{first.direction}' as '{other}', and must be perpendicular"
-                raise report(("friction", number, "second_tangent"), fault)
+            if axis and axis == scene.direction_at(other):
+                fault = f"'{name}' lies along '{axis}' as '{other}', and must be perpendicular"
+                raise report(key, fault)
+
+
+def _perpendicular(scene: Scene) -> Iterator[tuple[KeyPath, str, list[str]]]:
+    """Where an interface is named, and those that it must be perpendicular to."""
+    for number, rough in enumerate(scene.friction):
+        by_stop = rough.stop is not None and rough.stop < len(scene.stops)
+        normal = [scene.stops[rough.stop or 0].at] if by_stop else []
+        yield ("friction", number, "at"), rough.at, normal
+        if rough.second_tangent is not None:
+            second = ("friction", number, "second_tangent")
+            yield second, rough.second_tangent, [rough.at, *normal]
+    for number, ring in enumerate(scene.round_clearances):
+        yield ("round_clearances", number, "plane"), ring.plane[1], [ring.plane[0]]
+    for number, area in enumerate(scene.contact_areas):
+        if isinstance(area, ListedAreaTable):
+            others = [area.at]
+            for key in ("along", "second_along"):
+                named = getattr(area, key) or []
+                for name, *before in zip(named, *others, strict=False):
+                    yield ("contact_areas", number, key), name, before
+                others.append(named)
 
 
 def _check_area_of_components(

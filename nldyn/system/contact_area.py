@@ -79,8 +79,8 @@ def contact_area(
     Raises
     ------
     SystemModelError
-        For no points, lists that are not of one length, a weight that is not positive, or rigid
-        contact with what only a law has; else as `Stop`.
+        For no points, one that is named twice, lists that are not of one length, a weight that is
+        not positive, or rigid contact with what only a law has; else as `Stop`.
 
     Examples
     --------
@@ -97,6 +97,8 @@ def contact_area(
     count = len(points)
     if not count:
         raise SystemModelError(f"{owner}: there are no points")
+    if twice := [at for i, at in enumerate(points) if at in points[:i]]:
+        raise SystemModelError(f"{owner}: points must name each interface once, not '{twice[0]}'")
     shares = _of_points(owner, "weights", 1.0 if weights is None else weights, count)
     gaps = _of_points(owner, "gap", gap, count)
     others = [

@@ -80,6 +80,8 @@ class Friction:
                 )
         if self.fading_speed is not None:
             check_positive(owner, "fading_speed", self.fading_speed)
+            if self.at_rest is None:
+                raise SystemModelError(f"{owner}: fading_speed needs the at_rest that fades")
 
     def with_coefficient(self, coefficient: float) -> Friction:
         """The same with another coefficient, at rest by as much another one."""

@@ -109,7 +109,7 @@ class RigidStop:
             )
         check_sides(owner, self.at, self.against, self.direction)
         ends = (self.tangent, self.tangent_against)
-        law = check_tangent(owner, self.at, ends, self.friction)
+        law = check_tangent(owner, (self.at, self.against), ends, self.friction)
         object.__setattr__(self, "friction", law)
 
     @property

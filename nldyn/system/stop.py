@@ -227,25 +227,37 @@ def _ratio_without_pull(lost: float) -> float:
 
 
 def check_tangent(
-    owner: str, at: str, ends: tuple[str | None, str | None], friction: Friction | float | None
+    owner: str,
+    sides: tuple[str, str | None],
+    ends: tuple[str | None, str | None],
+    friction: Friction | float | None,
 ) -> Friction | None:
-    """The law of friction along a stop's tangent, whose two ends are given; None without any.
+    """The law of friction along a stop's tangent; None without any.
+
+    Given are the interfaces at both sides, along the normal and along the tangent.
 
     Raises
     ------
     SystemModelError
         Where friction or its tangent is missing, or the tangent is no interface of its own.
     """
-    tangent, against = ends
-    for name, end in (("tangent", tangent), ("tangent_against", against)):
+    tangent, beside = ends
+    for name, end in (("tangent", tangent), ("tangent_against", beside)):
         check_types(**{f"{owner}: {name}": (end, str, None)})
-    if friction is None and tangent is None and against is None:
+    if friction is None and tangent is None and beside is None:
         return None
     if friction is None or tangent is None:
         raise SystemModelError(f"{owner}: friction needs both friction and tangent")
-    if tangent in (at, against):
+    if tangent in (sides[0], beside):
         raise SystemModelError(f"{owner}: tangent must be another interface")
+    check_other_side(owner, "tangent_against", beside, sides[1])
     return as_friction(owner, friction)
+
+
+def check_other_side(owner: str, name: str, beside: str | None, against: str | None) -> None:
+    """Refuse a tangent of the other side where the stop has none but the ground."""
+    if beside is not None and against is None:
+        raise SystemModelError(f"{owner}: {name} needs the 'against' of the same side")
 
 
 @dataclass(frozen=True)
@@ -368,7 +380,7 @@ class Stop:
 
     def _check_friction(self, owner: str) -> None:
         ends = (self.tangent, self.tangent_against)
-        law = check_tangent(owner, self.at, ends, self.friction)
+        law = check_tangent(owner, (self.at, self.against), ends, self.friction)
         across = self.across
         if law is None and self.tangential_stiffness is None and across is None:
             return
@@ -385,6 +397,8 @@ class Stop:
         check_spring(owner, self.tangential_stiffness, law)
         first = (self.at, self.against, *ends)
         check_plane(owner, first, across, self.tangential_stiffness, law)
+        beside = self.second_tangent_against
+        check_other_side(owner, "second_tangent_against", beside, self.against)
 
     @property
     def across(self) -> Across:

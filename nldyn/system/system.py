@@ -49,6 +49,7 @@ LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fo
 NEGATIVE = 1e-10  # of a stiffness with a unit diagonal: an eigenvalue that is not rounding
 NOT_HELD = "the structure is free to move in a way that no stop limits, and nothing tells its place"
 MOST_SIDES = 1024  # of stops to both sides, which are tried together
+PARALLEL = 1e-12  # sine of the angle between modal vectors that are one motion
 FEW = 8.0  # roundings of each mode in the largest ω²
 
 
@@ -1031,7 +1032,7 @@ class System:
                 )
         for number in self.over_planes:
             slider = self.sliders[number]
-            if _rank([self.vector_between(*ends) for ends in slider.ends], self.size) < 2:
+            if _one_motion(*(self.vector_between(*ends) for ends in slider.ends)):
                 raise SystemModelError(
                     f"friction at '{slider.at}' acts over no plane with '{slider.ends[1][0]}': in "
                     f"the {self.size} modes both tangents are one motion, or none"
@@ -1053,18 +1054,20 @@ class System:
                     f"'{stop.at}' leave out at_rest and fading_speed, or give the stop a stiffness"
                 )
             along = self.vector_between(stop.tangent, stop.tangent_against)
-            if _rank([self.stop_vector(stop), along], self.size) < 2:
+            if _one_motion(self.stop_vector(stop), along):
                 raise SystemModelError(
                     f"friction at '{stop.tangent}' acts on no motion along the rigid stop at "
                     f"'{stop.at}': in the {self.size} modes both are one motion, or none"
                 )
         for ring in self.round_stops.values():
-            if ring.friction and _rank(self.stop_vectors(ring), self.size) < 2:
+            if ring.friction and _one_motion(*self.stop_vectors(ring)):
                 x, y = ring.plane
                 raise SystemModelError(
                     f"friction of the round clearance at '{x}', '{y}' acts on no motion all around:"
                     f" in the {self.size} modes both are one motion, or none"
                 )
+        if self.size > 1:  # in one mode all directions are one motion
+            self._check_normals()
         for together in self._sliders_at_once() if self.sliders else ():
             rows = [self.vector_between(s.at, s.against) for s in together]
             if _rank(rows, self.size) < len(rows):
@@ -1075,10 +1078,31 @@ class System:
                     "keep more modes"
                 )
 
+    def _check_normals(self) -> None:
+        """Refuse tangents along the normal of their stop, and rings of one direction."""
+        for slider in self.sliders:
+            if slider.stop < 0 or isinstance(stop := self.stops[slider.stop], RoundStop):
+                continue
+            normal = self.stop_vector(stop)
+            for at, against in slider.ends:
+                along = self.vector_between(at, against)
+                if np.any(along) and _one_motion(normal, along):
+                    raise SystemModelError(
+                        f"friction at '{at}' acts along the normal of the stop at '{stop.at}': in "
+                        f"the {self.size} modes both are one motion"
+                    )
+        for ring in self.round_stops.values():
+            if np.all(np.any(rows := self.stop_vectors(ring), axis=1)) and _one_motion(*rows):
+                x, y = ring.plane
+                raise SystemModelError(
+                    f"the directions of the round clearance at '{x}', '{y}' must be perpendicular: "
+                    f"in the {self.size} modes both are one motion"
+                )
+
     def _check_rigid_ring(self, ring: RoundStop) -> None:
         """Refuse what holds the same motion as a rigid round clearance does."""
         rows = self.stop_vectors(ring)
-        if _rank(rows, self.size) < 2:
+        if _one_motion(*rows):
             x, y = ring.plane
             raise SystemModelError(
                 f"the rigid round clearance at '{x}', '{y}' needs a motion all around: in the "
@@ -1235,6 +1259,13 @@ def same_system(a: System, b: System) -> bool:
 
 def _rank(rows: Sequence[Real], columns: int) -> int:
     return int(np.linalg.matrix_rank(np.array(rows))) if rows and columns else 0
+
+
+def _one_motion(first: Real, second: Real) -> bool:
+    """Whether two modal vectors are parallel to rounding, or one of them is zero."""
+    sizes = float(np.linalg.norm(first)), float(np.linalg.norm(second))
+    same = np.copysign(sizes[0], first @ second) * second
+    return bool(np.linalg.norm(sizes[1] * first - same) <= PARALLEL * sizes[0] * sizes[1])
 
 
 def _of_size(spin: Spin, size: int) -> Spin:

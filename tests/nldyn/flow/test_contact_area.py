@@ -143,6 +143,7 @@ def test_the_gap_of_an_area_is_that_of_its_nearest_point():
 def test_what_makes_no_area_is_refused_in_a_sentence():
     for arguments, said in (
         ({"points": []}, "there are no points"),
+        ({"points": ["a", "a"]}, "must name each interface once, not 'a'"),
         ({"stiffness": -1.0}, "stiffness must be positive"),
         ({"weights": [1.0]}, "one number or one for each of 2 points"),
         ({"weights": [1.0, 0.0]}, "weights must be positive"),

@@ -284,6 +284,11 @@ def test_friction_of_zero_changes_nothing():
         (lambda: Friction(-0.1), "coefficient must not be negative"),
         (lambda: Friction(0.2, 0.1, 1.0), "at_rest must be at least"),
         (lambda: Friction(0.2, 0.1), "at_rest must be at least"),
+        (lambda: Friction(0.2, fading_speed=0.1), "needs the at_rest that fades"),
+        (
+            lambda: Stop("x", 1.0, friction=0.2, tangent="y", tangent_against="z"),
+            "tangent_against needs the 'against'",
+        ),
         (
             lambda: DryFriction("x", 1.0, Friction(0.2, 0.3), tangential_stiffness=1.0),
             "nothing tells how far the spring leaps",

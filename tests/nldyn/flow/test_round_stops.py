@@ -611,6 +611,15 @@ def test_friction_in_a_plane_of_one_motion_is_told():
         System.from_matrices([[MASS]], [[STIFFNESS]], {"x": [1.0], "y": [0.5]}, stops=[ring])
 
 
+@pytest.mark.parametrize("size", [-1.0, 0.3])
+def test_directions_of_a_ring_that_are_one_motion_are_told(size):
+    rows = {"x": [1.0, 0.0], "y": [size, 0.0]}
+    with pytest.raises(SystemModelError, match="must be perpendicular"):
+        System.from_matrices(
+            np.eye(2), [[2.0, -1.0], [-1.0, 2.0]], rows, stops=[RoundStop(("x", "y"), 5.0, 0.1)]
+        )
+
+
 def test_unknown_interfaces_are_told():
     with pytest.raises(SystemModelError, match="'z'"):
         jeffcott([RoundStop(("x", "z"), 1e6, 1e-3)])

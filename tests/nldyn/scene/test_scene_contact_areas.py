@@ -188,11 +188,55 @@ def test_what_the_points_stand_for_is_told_with_its_unit(caplog):
     assert "contact area 'support': 20 points that stand for 0.3 m;" in caplog.text
 
 
-def test_a_second_tangent_along_the_first_one_is_refused(tmp_path):
+STOP = """
+[[stops]]
+at = "tip"
+law = "linear"
+stiffness = 1.0
+"""
+RUBS = """
+[[friction]]
+at = "{}"
+coefficient = 0.1
+tangential_stiffness = 1.0
+"""
+RING = """
+[[round_clearances]]
+plane = ["tip", "again"]
+clearance = 1e-3
+stiffness = 1.0
+"""
+AREA = """
+[[contact_areas]]
+name = "of interfaces"
+at = ["side", "tip"]
+along = ["tip", "again"]
+stiffness = 1.0
+friction = 0.1
+"""
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (
+            RUBS.format("side") + 'normal_force = 1.0\nsecond_tangent = "beside"',
+            "second_tangent 'beside' lies along 'x' as 'side', and must be perpendicular",
+        ),
+        (STOP + RUBS.format("again") + "stop = 0", "at 'again' lies along 'y' as 'tip'"),
+        (
+            STOP + RUBS.format("side") + 'stop = 0\nsecond_tangent = "again"',
+            "second_tangent 'again' lies along 'y' as 'tip'",
+        ),
+        (RING, "plane 'again' lies along 'y' as 'tip'"),
+        (AREA, "along 'again' lies along 'y' as 'tip'"),
+    ],
+)
+def test_tangents_along_the_normal_or_each_other_are_refused(tmp_path, more, told):
     place = '[interfaces.tip]\nat = "tip"\n'
-    again = place.replace(".tip", ".{}") + 'direction = "{}"\n'
-    rubs = '[[friction]]\nat = "side"\ncoefficient = 0.1\nnormal_force = 1.0\n'
-    rubs += 'tangential_stiffness = 1.0\nsecond_tangent = "again"\n'
-    more = again.format("side", "x") + again.format("again", "x") + rubs
-    with pytest.raises(SceneError, match="lies along 'x' as 'side', and must be perpendicular"):
-        landing(tmp_path, (place, more + place))
+    named = (("side", "x"), ("beside", "x"), ("again", "y"))
+    others = "".join(
+        place.replace(".tip", f".{name}") + f'direction = "{axis}"\n' for name, axis in named
+    )
+    with pytest.raises(SceneError, match=told):
+        landing(tmp_path, (place, more + "\n" + others + place))

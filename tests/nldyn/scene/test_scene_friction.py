@@ -136,6 +136,17 @@ second_tangent = "{second}"
 """
 
 
+@pytest.mark.parametrize("table", ["along = [-0.3, 0.0]", "along = [1e-3, 0.0]"])
+@pytest.mark.parametrize("law", ["", "tangential_stiffness = 7.0"])
+def test_a_row_along_the_normal_is_no_tangent(tmp_path, table, law):
+    path = tmp_path / "scene.toml"
+    rough = AT_STOP.replace("at_rest = 0.4\nfading_speed = 0.1", law)
+    path.write_text(SCENE.format(other=rough).replace("along = [0.0, 1.0]", table))
+    told = "friction at 'along' acts along the normal of the stop at 'across'"
+    with pytest.raises(SceneError, match=told):
+        build_system(load_scene(path))
+
+
 def test_what_it_slides_on_moves_along_both_tangents_of_a_plane(tmp_path):
     belt = over_a_plane() + "base_speed = [0.1, -0.2]\n"
     slider = build_system(with_third(tmp_path, belt)).sliders[0]
