@@ -87,7 +87,7 @@ class CoupledStops:
                     break
                 closed[int(np.argmax(wrong))] ^= True  # the first one: so it ends
             found.append(known[key])
-        return np.array(found)
+        return np.array(found).reshape(len(depths), *self.common.shape)
 
     def penetrations(self, depths: Real) -> Real:
         """Penetrations δ (k, n) by those of the modes."""

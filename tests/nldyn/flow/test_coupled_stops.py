@@ -18,8 +18,11 @@ from nldyn import (
     RigidStop,
     Stop,
     System,
+    continue_branch,
+    save,
     solve_orbit,
 )
+from nldyn.io.branches import load_branches
 from nldyn.system import rest
 
 OMEGA, LOAD = 7.0, 20.0
@@ -220,3 +223,12 @@ def test_rest_on_coupled_stops_is_that_of_their_complementarity_problem():
     least, expected = min((wrong(closed) for closed in model.sets), key=lambda each: each[0])
     assert least < 0.0
     np.testing.assert_allclose(q, expected, rtol=1e-8)
+
+
+def test_a_file_keeps_what_stops_have_in_common(tmp_path):
+    orbit = solve_orbit(random_system(1, 2)[0], OMEGA / (2.0 * np.pi))
+    save(continue_branch(orbit, (1.113, 1.116)), tmp_path / "branch.h5")
+    (again,) = load_branches(tmp_path / "branch.h5")
+    np.testing.assert_array_equal(
+        again.nodes[0].orbit.system.common_flexibility, orbit.system.common_flexibility
+    )
