@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from nldyn.base.errors import FAILURES
-from nldyn.bifurcations.chord import Chord
+from nldyn.bifurcations.chord import BESIDE, Chord
 from nldyn.bifurcations.codimension_two import is_torus, is_torus_curve, torus_pair
 from nldyn.bifurcations.on_curve import between, clear_of_nodes, curve_tests
 from nldyn.bifurcations.point import BranchNode, SpecialPoint
@@ -22,6 +22,7 @@ from nldyn.orbits.conditions import UNFOLDED, Both, BranchPointCondition, Grazin
 POLE = 1e-3  # of its values beside it: what a test is not below where it has no root but a pole
 NOISY = 0.1  # the same for a coefficient made of differences, whose rounding is a hundredth of them
 ALIKE = 1e-6  # share of a step within which touches are those of one orbit by symmetry
+FLAT = 1e-10  # part of a unit tangent along the parameter of limit cycles that is rounding
 TURNS_BACK = 1e-3  # part of a unit tangent along both parameters, at a cusp
 
 
@@ -45,6 +46,8 @@ def marks_between(a: BranchNode, b: BranchNode) -> tuple[list[SpecialPoint], lis
     jumps = isinstance(a.condition, Turning) and bool(a.corner or b.corner)
     for name in [] if jumps else _changes_of_sign(a, b):
         try:
+            if name == "LP" and isinstance(a.condition, Turning) and _keeps_parameter(chord):
+                continue
             sigma, error = root(lambda x, name=name: curve_tests(chord.at(x))[name])  # type: ignore[misc]
             point = chord.at(sigma)
             least = NOISY if name == "GPD" else POLE
@@ -183,6 +186,19 @@ def turns_back(a: BranchNode, b: BranchNode) -> bool:
     """Whether the first parameter turns between two points."""
     place = a.family.n_states
     return bool(a.tangent[place] * b.tangent[place] < 0.0)
+
+
+def _keeps_parameter(chord: Chord) -> bool:
+    """Whether cycles of all sizes are at one parameter, as where they are linear; its tests round.
+
+    At a fold the tangent is without the parameter, too, but not beside it.
+    """
+    place = chord.first.family.n_states
+    ends = [chord.first, chord.last]
+    flat = [abs(end.tangent[place]) < FLAT for end in ends]
+    if any(flat) and not all(flat):
+        flat = [abs(chord.at(BESIDE if flat[0] else 1.0 - BESIDE).tangent[place]) < FLAT]
+    return all(flat)
 
 
 def _missing(name: str, point: BranchNode, why: Exception | str) -> str:

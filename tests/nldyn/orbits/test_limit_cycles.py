@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 from nldyn import (
     ConvergenceError,
     HarmonicForce,
+    Stop,
     System,
     SystemModelError,
     continue_branch,
@@ -254,3 +255,27 @@ def test_a_branch_is_saved_goes_on_after_an_interruption_and_is_extended(tmp_pat
     again = continue_branch(start, (0.45, 0.54), parameter="base_speed", checkpoint=kept)
     assert again.values.tolist() == short.values.tolist()
     assert continue_branch(short, (0.45, 0.56)).values.max() == pytest.approx(0.56)
+
+
+@pytest.mark.parametrize(
+    ("mu", "speed", "spring"), [(0.9, 0.5, None), (1.1, 2.0, None), (0.9, 0.5, 20.0)]
+)
+def test_cycles_of_one_friction_are_no_folds(mu, speed, spring):
+    """Flutter of a block that never parts nor sticks is linear: all sizes have one friction.
+
+    Its mass 1 has stiffness 2 both ways, dashpots c = 0.01, and coupling 0.6 and 0.6 - μ: a pair is
+    on the axis where 0.6 (μ - 0.6) = 2 c².
+    """
+    stop = Stop(
+        "y", 1.0, exponent=1.0, gap=-1.0, direction=-1, tangent="x",
+        friction=Friction(mu, base_speed=speed), tangential_stiffness=spring,
+    )  # fmt: skip
+    system = System.from_matrices(
+        np.eye(2), [[2.0, -0.6], [-0.6, 1.0]], {"x": [1.0, 0.0], "y": [0.0, 1.0]},
+        damping=0.01 * np.eye(2), stops=[stop],
+    )  # fmt: skip
+    branch = continue_branch(limit_cycle(system), (0.55, mu), parameter="friction")
+    first, second, *_ = branch.special_points
+    assert {mark.kind for mark in branch.special_points} == {"Hopf", "GR"}
+    for mark in (first, second):
+        assert mark.value == pytest.approx(0.6 + 2e-4 / 0.6, rel=1e-12)
