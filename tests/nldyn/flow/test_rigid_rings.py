@@ -536,7 +536,7 @@ def test_a_branch_ends_where_it_grazes_a_rigid_ring():
     """It is not followed on behind it, and says so."""
     branch = continue_branch(solve_orbit(two_directions(), 9.0), (8.87, 9.0))
     assert branch.stop_reason.startswith("grazes a rigid stop at 8.8857")
-    assert branch.special_points[0].kind == "grazing"
+    assert branch.special_points[0].kind == "GR"
 
 
 def test_states_behind_it_are_known_and_mirrored():
