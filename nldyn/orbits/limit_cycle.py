@@ -94,7 +94,25 @@ def limit_cycle(
         check_frequency("frequency_hz", frequency_hz)
     problem = shooting_problem(flow, 1, segments)
     state, omega = _repeated(flow, _start(flow, start), _unit_of_time(flow, frequency_hz), name)
-    return limit_cycle_near(problem, state, omega, name)
+    found = limit_cycle_near(problem, state, omega, name)
+    cycles = _cycles_within(found)
+    if cycles == 1:
+        return found
+    state = problem.nodes(found.point)[0]
+    return limit_cycle_near(problem, state, cycles * found.omega, name)
+
+
+def _cycles_within(orbit: Orbit) -> int:
+    """How often a motion comes back to its start within a period that was found.
+
+    One that settles slowly repeats itself better after several cycles than after one.
+    """
+    motion, (begin, end) = orbit.trajectory, orbit.trajectory.span
+    size = float(np.ptp(samples(motion), axis=0).max())
+    counts = np.arange(MOST_TURNS, 1, -1)
+    away = motion.states(begin + (end - begin) / counts) - motion.states(np.array([begin]))
+    back = counts[np.linalg.norm(away, axis=1) <= SAME * size]
+    return int(back.max(initial=1))
 
 
 def limit_cycle_near(problem: ShootingProblem, state: Real, omega: float, observe: str) -> Orbit:

@@ -257,24 +257,36 @@ def test_a_branch_is_saved_goes_on_after_an_interruption_and_is_extended(tmp_pat
     assert continue_branch(short, (0.45, 0.56)).values.max() == pytest.approx(0.56)
 
 
-@pytest.mark.parametrize(
-    ("mu", "speed", "spring"), [(0.9, 0.5, None), (1.1, 2.0, None), (0.9, 0.5, 20.0)]
-)
-def test_cycles_of_one_friction_are_no_folds(mu, speed, spring):
-    """Flutter of a block that never parts nor sticks is linear: all sizes have one friction.
+def fluttering(mu, speed, spring=None):
+    """A block that is pressed on a belt, of mass 1, with dashpots c = 0.01 along and across.
 
-    Its mass 1 has stiffness 2 both ways, dashpots c = 0.01, and coupling 0.6 and 0.6 - μ: a pair is
-    on the axis where 0.6 (μ - 0.6) = 2 c².
+    Where it never parts nor sticks its stiffness is 2 both ways, with couplings 0.6 and 0.6 - μ: a
+    pair is on the axis where 0.6 (μ - 0.6) = 2 c².
     """
     stop = Stop(
         "y", 1.0, exponent=1.0, gap=-1.0, direction=-1, tangent="x",
         friction=Friction(mu, base_speed=speed), tangential_stiffness=spring,
     )  # fmt: skip
-    system = System.from_matrices(
+    return System.from_matrices(
         np.eye(2), [[2.0, -0.6], [-0.6, 1.0]], {"x": [1.0, 0.0], "y": [0.0, 1.0]},
         damping=0.01 * np.eye(2), stops=[stop],
     )  # fmt: skip
-    branch = continue_branch(limit_cycle(system), (0.55, mu), parameter="friction")
+
+
+def test_a_motion_that_settles_slowly_has_the_period_of_one_cycle():
+    """On a faster belt the same motion settles in another rhythm, as long as it does not stick."""
+    slow, fast = (limit_cycle(fluttering(0.9, speed)) for speed in (0.5, 2.0))
+    assert slow.impacts == fast.impacts == 1
+    assert fast.frequency_hz == pytest.approx(slow.frequency_hz, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("mu", "speed", "spring"), [(0.9, 0.5, None), (0.9, 2.0, None), (0.9, 0.5, 20.0)]
+)
+def test_cycles_of_one_friction_are_no_folds(mu, speed, spring):
+    """Flutter of a block that never parts nor sticks is linear: all sizes have one friction."""
+    start = limit_cycle(fluttering(mu, speed, spring))
+    branch = continue_branch(start, (0.55, mu), parameter="friction")
     first, second, *_ = branch.special_points
     assert {mark.kind for mark in branch.special_points} == {"Hopf", "GR"}
     for mark in (first, second):
