@@ -82,13 +82,14 @@ def add_friction(
     belt, speed = float(rng.choice([0.0, 0.1])), float(rng.choice([0.0, 0.1]))
     law, spring = Friction(float(rng.uniform(0.0, 1.0)), base_speed=belt), 10.0 ** rng.uniform(4, 8)
     second = "c" if rng.random() < 0.7 else None
+    give = spring if rng.random() < 0.5 else None
     if rng.random() < 0.4:
         stops.append(
             Stop("a", 1e6, float(rng.choice([1.0, 1.5])), friction=law, tangent="b",
-                 tangential_stiffness=spring, second_tangent=second)
+                 tangential_stiffness=give, second_tangent=second)
         )  # fmt: skip
     if rng.random() < 0.4:
-        dampers.append(DryFriction("b", 10.0, law, None, spring, second))
+        dampers.append(DryFriction("b", 10.0, law, None, give, second))
     if rng.random() < 0.4:
         stops.append(
             RoundStop(("a", "b"), 1e7, 1e-4, 1.5, (1e-5, 0.0), friction=0.2, surface_speed=speed)

@@ -22,6 +22,7 @@
 #include "events.c"
 #include "contact.c"
 #include "rubbing_impact.c"
+#include "hard_disc.c"
 #include "rigid.c"
 #include "record.c"
 #include "segments.c"

@@ -6,7 +6,7 @@
 #define NEAR_END 1e-3 /* of a panel: an event that it aims at and that happens so near its end */
 #define INSTANTS 5.0 /* the same of another event: in errors of its instant, at most */
 #define FARTHEST_END 1e-7
-#define LET_GO 1e-5 /* the same of a slider that is let go at the end: its force is as small there */
+#define GIVEN_UP 1e-5 /* the same of a slider that is let go at the end: its force is as small there */
 #define MISSED 0.01 /* of the panel first tried: no event in one so short: it is farther off, */
 #define FARTHER 10.0 /* and the next panel is so many times longer */
 #define WITHIN 1e-6 /* of a panel: a doubtful place nearer to an end is that of a known switch */
@@ -189,7 +189,7 @@ static int judge(Motion *M, Trial *trial, Event event, bool fine, bool lost)
         near_end = larger(smaller(INSTANTS * stop_of(fl, event.stop)->instant, FARTHEST_END), AT_ONCE);
     if (trial->aim >= 0 && event.stop >= 0 && is_sprung(fl, event.stop) &&
         (int)stop_of(fl, event.stop)->normal == trial->aim)
-        near_end = larger(near_end, LET_GO);
+        near_end = larger(near_end, GIVEN_UP);
     bool ends = event.where > 1.0 - near_end;
     if (event.stop >= 0 && (trial->aim < 0 || !ends) && !lost) {
         int goal = ends_smoothly(fl, event.stop, M->closed) ? trial->smooth : trial->to_switch;

@@ -31,6 +31,7 @@ enum Status {
 #define MOST_STEPS 10000000 /* in the search for one contact: a second */
 #define MOST_PIECES 20000   /* flights and panels in one segment */
 /* what a stop damps: a panel shows decay by e^-8 to 14 digits, and nothing is left of e^-40 */
+#define LET_GO 2 /* in place of 1 in fl->slides: over a plane from rest on, without a spring */
 #define DECAY 8.0
 #define FADED 40.0
 /* below this exponent a slope sets in almost at once: there nodes at the switch count, and less
@@ -182,7 +183,7 @@ typedef struct {
     const double *blocks, *rows, *bound3, *stops;
     double *pushes; /* (n_stops, 2n): w' = A w - Σ pushes F */
     const int64_t *laws;
-    int *slides; /* (n_stops,) which way each slider slides: 1, -1, or 0 where it sticks */
+    int *slides; /* (n_stops,) which way each slider slides: 1, -1, or 0 where it sticks, see LET_GO */
     Term *terms; /* beside the steady one at order 1 */
     /* (1 + k, 2 + n_parameters, 2n): amplitude of the steady response at order 1, z = w +
      * Re(response[0, 0] e^{iωt}), and of each further term; then their derivatives with respect to
@@ -258,6 +259,7 @@ typedef struct {
     double *pushed, *carried, *added, *driven_many, *flown, *pushing, *showing; /* many stops */
     double *stop_forces, *pushes, *first_pushes, *held, *mobility; /* rigid stops */
     double *across, *outward; /* (n_stops,) see `fill_directions` */
+    double *heading; /* (n_stops,) direction along which what is let go over a plane leaves */
     double *drags; /* (n_stops,) speeds of the places of sliders behind springs, see `drag_speed` */
     int *resting, *mobility_order;
     double *rate, *moved, *moved_shift, *along, *along_columns, *offsets;

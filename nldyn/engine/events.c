@@ -102,6 +102,10 @@ static double hold_noise(const Flow *fl, int s, const double *w)
 {
     if (is_strained(fl, s)) return strain_noise(fl, s, w);
     double noise = pressing_noise(fl, s, w), mobility = stop_of(fl, s)->mobility;
+    if (is_disc(fl, s)) {
+        int other = (int)stop_of(fl, s)->beside;
+        return noise / mobility + pressing_noise(fl, other, w) / stop_of(fl, other)->mobility;
+    }
     if (!is_second(fl, s)) return noise / mobility;
     int lead = (int)stop_of(fl, s)->lead;
     noise += pressing_noise(fl, lead, w);
@@ -285,7 +289,7 @@ static double graded_length(const Flow *fl, const Panel *panel, const double *w,
             bool hidden = GROWTH < growth * HIDDEN_GROWTH * h;
             if (growth > 0.0 && !hidden) longest = smaller(longest, GROWTH / growth);
         }
-        bool turns = disc_of(fl, panel, a) == s && panel->growth[a] == 0.0;
+        bool turns = disc_of(fl, panel, a) == s && is_sprung(fl, s) && panel->growth[a] == 0.0;
         if (sign > 0.0 && turns && panel->decayed[a] <= FADED) {
             Disc at = disc_now(fl, s, w, phase);
             if (at.size > 0.0 && at.along > 0.0)
@@ -481,6 +485,7 @@ static Event first_event(const Motion *M, int kind, double phase, double h)
         if (is_bond(fl, stop) || is_mover(fl, stop) || is_mate(fl, stop)) continue;
         if (is_second(fl, stop) && !rubs_around(fl, stop)) continue;
         if (rubs(fl, stop) && (!M->closed[stop] || slides_freely(fl, stop))) continue;
+        if (is_hard_disc(fl, stop) && fl->slides[stop] != 0) continue; /* see `time_to_rest` */
         if (is_rigid(fl, stop) && !is_round(fl, stop) && !M->closed[stop] && held_open(M, stop)) continue;
         if (!rubs(fl, stop)) {
             int out = watched(fl, stop, M->closed, M->w, phase);

@@ -9,7 +9,9 @@
  *
  * whatever g is: the rate of the length, which is put right where a panel ends. It is none, but
  * where a contact begins, with e = 0. So the place has the speed v - e': a row for each tangent,
- * which acts on the place as forces do on velocities, see `moves` in `Stop`. */
+ * which acts on the place as forces do on velocities, see `moves` in `Stop`.
+ *
+ * Without a spring the force is R v/|v|: there are no places, and no rows of these. */
 #include "engine.h"
 
 enum { OF_NORMAL = 4, N_TILTS = 5 }; /* strains and speeds along both tangents, normal force */
@@ -55,6 +57,22 @@ static void disc_law(const Flow *fl, int s, const double *strain, const double *
     }
 }
 
+/* the same without a spring: forces alone, against the speed along what it slides on */
+static void hard_disc_law(const Flow *fl, int s, const double *speed, double normal, double *found,
+                          double by[4][N_TILTS])
+{
+    double friction = stop_of(fl, s)->friction, size = hypot(speed[0], speed[1]);
+    memset(by, 0, sizeof(double) * 4 * N_TILTS);
+    for (int f = 0; f < 4; f++) found[f] = 0.0;
+    if (!(size > 0.0)) return;
+    double u[2] = {speed[0] / size, speed[1] / size}, t[2] = {-u[1], u[0]};
+    for (int i = 0; i < 2; i++) {
+        found[i] = friction * normal * u[i];
+        by[i][OF_NORMAL] = friction * u[i];
+        for (int j = 0; j < 2; j++) by[i][2 + j] = friction * normal / size * t[i] * t[j];
+    }
+}
+
 /* first row of what slides over a plane that a place among the closed ones belongs to, or -1 */
 static int disc_of(const Flow *fl, const Panel *panel, int a)
 {
@@ -71,14 +89,16 @@ static bool any_disc(const Flow *fl, const Panel *panel)
     return false;
 }
 
-/* places among the closed ones of its forces along both tangents and of the speeds of its place */
-static void disc_places(const Flow *fl, const Panel *panel, int s, int *places)
+/* places among the closed ones of its forces along both tangents and, behind a spring, of the speeds
+ * of its place; how many */
+static int disc_places(const Flow *fl, const Panel *panel, int s, int *places)
 {
     int rows[2] = {s, (int)stop_of(fl, s)->beside};
     for (int d = 0; d < 2; d++) {
         places[d] = place_of(panel, rows[d]);
-        places[2 + d] = place_of(panel, (int)stop_of(fl, rows[d])->mover);
+        places[2 + d] = is_sprung(fl, s) ? place_of(panel, (int)stop_of(fl, rows[d])->mover) : -1;
     }
+    return is_sprung(fl, s) ? 4 : 2;
 }
 
 /* derivatives (m,) of the force or speed at a place among the closed ones: by strains and speeds
@@ -95,23 +115,34 @@ static double normal_at(const Flow *fl, const Panel *panel, int s, int i)
     return panel->F[place_of(panel, (int)stop_of(fl, s)->normal) * panel->m + i];
 }
 
+/* strains and speeds along both tangents at node i of a panel */
+static void disc_at(const Flow *fl, const Panel *panel, const int *places, int i, double *strain,
+                    double *speed)
+{
+    for (int d = 0; d < 2; d++) {
+        double belt = stop_of(fl, panel->active[places[d]])->belt;
+        strain[d] = panel->output[places[d] * panel->m + i];
+        speed[d] = panel->output[(panel->na + places[d]) * panel->m + i] - belt;
+    }
+}
+
 /* fill F and its derivatives of what slides over a plane, of its first row */
 static void disc_forces(const Flow *fl, Panel *panel, int a, double *slope)
 {
     int na = panel->na, m = panel->m, s = panel->active[a], places[4];
-    disc_places(fl, panel, s, places);
+    int count = disc_places(fl, panel, s, places), own = is_sprung(fl, s) ? 0 : 2;
     for (int i = 0; i < m; i++) {
-        double strain[2], speed[2], found[4], by[4][N_TILTS];
-        for (int d = 0; d < 2; d++) {
-            strain[d] = panel->output[places[d] * m + i];
-            speed[d] = panel->output[(na + places[d]) * m + i];
-        }
-        disc_law(fl, s, strain, speed, normal_at(fl, panel, s, i), panel->growth[a], found, by);
-        for (int f = 0; f < 4; f++) {
+        double strain[2], speed[2], found[4], by[4][N_TILTS], normal = normal_at(fl, panel, s, i);
+        disc_at(fl, panel, places, i, strain, speed);
+        if (is_sprung(fl, s))
+            disc_law(fl, s, strain, speed, normal, panel->growth[a], found, by);
+        else
+            hard_disc_law(fl, s, speed, normal, found, by);
+        for (int f = 0; f < count; f++) {
             panel->F[places[f] * m + i] = found[f];
-            slope[places[f] * m + i] = f < 2 ? by[f][f] : 0.0;
-            slope[(na + places[f]) * m + i] = 0.0;
-            if (f < 2) by[f][f] = 0.0;
+            slope[places[f] * m + i] = f < 2 && own == 0 ? by[f][f] : 0.0;
+            slope[(na + places[f]) * m + i] = own == 2 ? by[f][2 + f] : 0.0;
+            if (f < 2) by[f][own + f] = 0.0;
             if (f >= 2 && panel->rough) by[f][OF_NORMAL] = 0.0;
             for (int c = 0; c < N_TILTS; c++) tilt_of(panel, places[f], c)[i] = by[f][c];
         }
@@ -132,8 +163,8 @@ static void add_tilted(const Flow *fl, const Panel *panel, int o, double sign,
 {
     int m = panel->m, a = o % panel->na, places[4], s = disc_of(fl, panel, a);
     if (s < 0 || is_mover(fl, panel->active[a])) return;
-    disc_places(fl, panel, s, places);
-    for (int f = 0; f < 4; f++) {
+    int count = disc_places(fl, panel, s, places);
+    for (int f = 0; f < count; f++) {
         const double *tilt = tilt_of(panel, places[f], tilt_by(fl, panel, o));
         for (int i = 0; i < m; i++) {
             const double *from = outputs + (size_t)i * output_row;
@@ -186,18 +217,16 @@ static void add_disc_columns(const Flow *fl, const Panel *panel, int a, int i, i
 {
     int na = panel->na, m = panel->m, s = panel->active[a], places[4];
     const Stop *slider = stop_of(fl, s);
-    disc_places(fl, panel, s, places);
+    int count = disc_places(fl, panel, s, places);
     double e[2], v[2], normal = normal_at(fl, panel, s, i);
-    for (int d = 0; d < 2; d++) {
-        e[d] = panel->output[places[d] * m + i];
-        v[d] = panel->output[(na + places[d]) * m + i];
-    }
-    if (slider->friction == 0.0) memcpy(e, v, sizeof e); /* it would pull against the sliding */
+    disc_at(fl, panel, places, i, e, v);
+    if (slider->friction == 0.0 || !is_sprung(fl, s))
+        memcpy(e, v, sizeof e); /* it pulls, or would, against the sliding */
     double size = larger(hypot(e[0], e[1]), TINY);
     for (int c = 0; c < fl->n_parameters; c++) {
         int64_t column = fl->parameters[2 * c];
         if (!is_number_of(fl, c, s)) continue;
-        for (int f = 0; f < 4; f++) {
+        for (int f = 0; f < count; f++) {
             double *force = forces + (size_t)(places[f] * m + i) * n_columns + fl->size + c;
             double by_normal = tilt_of(panel, places[f], OF_NORMAL)[i];
             if (column == PRESSING) *force += by_normal;
@@ -210,14 +239,20 @@ static void add_disc_columns(const Flow *fl, const Panel *panel, int a, int i, i
     }
 }
 
-/* how often the direction has forgotten what it was, in a panel: where nothing presses on, that is
- * soon, and does not count */
+/* how often the direction has forgotten what it was, in a panel: where nothing presses on, or a strain
+ * begins, that is soon, and does not count */
 static double forgotten(const Flow *fl, const Gauss *tab, int kind, double h, const Panel *panel,
                         int a)
 {
     int na = panel->na, m = panel->m, s = panel->active[a], places[4];
     double most = TINY, total = 0.0;
     disc_places(fl, panel, s, places);
+    for (int p = 0; p < 2 * m && !is_sprung(fl, s); p++) {
+        int place = places[p / m], i = p % m;
+        total += h * tab->weights[kind * m + i] * stop_of(fl, panel->active[place])->mobility *
+                 panel->slope[(na + place) * m + i];
+    }
+    if (!is_sprung(fl, s) || panel->growth[a] > 0.0) return total;
     for (int i = 0; i < m; i++) {
         double along = 0.0, size = TINY;
         for (int d = 0; d < 2; d++) {
@@ -229,6 +264,19 @@ static double forgotten(const Flow *fl, const Gauss *tab, int kind, double h, co
         most = larger(most, stop_of(fl, s)->friction * fabs(normal_at(fl, panel, s, i)));
     }
     return total * stop_of(fl, s)->tangential / most;
+}
+
+/* least speed along both tangents at the nodes, of what slides without a spring */
+static double slowest_over(const Flow *fl, const Panel *panel, int a)
+{
+    double slowest = INFINITY, strain[2], speed[2];
+    int places[4];
+    disc_places(fl, panel, disc_of(fl, panel, a), places);
+    for (int i = 0; i < panel->m; i++) {
+        disc_at(fl, panel, places, i, strain, speed);
+        slowest = smaller(slowest, hypot(speed[0], speed[1]));
+    }
+    return larger(slowest, TINY);
 }
 
 /* fill `shown` (m,) with the force at a place among the closed ones or, of a place that moves, its
@@ -262,4 +310,64 @@ static double disc_kick(const Flow *fl, const Panel *panel, int a, double h)
         fastest = larger(fastest, largest(panel->output + (size_t)(na + places[d]) * m, m));
     }
     return most * h * stop_of(fl, s)->mobility / fastest;
+}
+
+/* slope of the polynomial through values (m,) at node i over the stretched time of a panel */
+static double slope_at_node(const Gauss *tab, const double *values, int i)
+{
+    double x = 2.0 * tab->ends_nodes[i + 1] - 1.0, total = 0.0;
+    double before = 0.0, here = 1.0, slope_before = 0.0, slope = 0.0; /* Legendre's polynomials */
+    for (int n = 0; n < tab->m; n++) {
+        total += legendre_coefficient(tab, values, n) * slope;
+        double next = ((2 * n + 1) * x * here - n * before) / (n + 1);
+        double slope_next = slope_before + (2 * n + 1) * here;
+        before = here;
+        here = next;
+        slope_before = slope;
+        slope = slope_next;
+    }
+    return 2.0 * total;
+}
+
+/* Fill the direction u (2,) in which what rests over a plane leaves, by the accelerations a that it
+ * would have without friction, and the most that this may be, R: (R B + σ) u = a with |u| = 1, so that
+ * it gets faster, by σ, along the direction in which it goes. */
+static void fill_leaving(const Flow *fl, int s, const double *free, double most, double *u)
+{
+    int other = (int)stop_of(fl, s)->beside;
+    double b = stop_of(fl, s)->mobility, c = between(fl, s, other), d = stop_of(fl, other)->mobility;
+    double low = 0.0, high = hypot(free[0], free[1]), size = 0.0;
+    for (int step = 0; step < 60; step++) {
+        double more = 0.5 * (low + high), p = most * b + more, q = most * c, r = most * d + more;
+        double det = larger(p * r - q * q, TINY);
+        u[0] = (r * free[0] - q * free[1]) / det;
+        u[1] = (p * free[1] - q * free[0]) / det;
+        size = hypot(u[0], u[1]);
+        if (size > 1.0)
+            low = more;
+        else
+            high = more;
+    }
+    for (int i = 0; i < 2; i++) u[i] /= larger(size, TINY);
+}
+
+/* Guess the forces of what has just been let go over a plane, at a place among the closed ones, by
+ * its rates with those that were guessed before. */
+static void guess_leaving(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel, int a)
+{
+    int na = panel->na, m = panel->m, first = panel->active[a], places[4];
+    disc_places(fl, panel, first, places);
+    for (int i = 0; i < m; i++) {
+        double free[2], u[2], normal = larger(normal_at(fl, panel, first, i), 0.0);
+        for (int d = 0; d < 2; d++) {
+            int row = panel->active[places[d]];
+            double *rates = panel->output + (size_t)(na + places[d]) * m;
+            free[d] = slope_at_node(tab, rates, i) / (h * tab->slope[kind * m + i]);
+            for (int e = 0; e < 2; e++)
+                free[d] += between(fl, row, panel->active[places[e]]) * panel->F[places[e] * m + i];
+        }
+        fill_leaving(fl, first, free, stop_of(fl, first)->friction * normal, u);
+        for (int d = 0; d < 2; d++)
+            panel->F[places[d] * m + i] = stop_of(fl, first)->friction * normal * u[d];
+    }
 }

@@ -285,7 +285,8 @@ static Choice first_panel(Motion *M, double phase, double h_max)
     for (int a = 0; a < panel->na && known; a++)
         known = largest(depth + (size_t)panel->active[a] * m, m) > 0.0;
     if (known && before->event >= 0.0 && rubs(fl, (int)before->event))
-        known = acts_in(panel, (int)before->event); /* else nothing presses on it now */
+        known = acts_in(panel, (int)before->event) && /* else nothing presses on it now */
+                !(is_hard_disc(fl, (int)before->event) && fl->slides[(int)before->event] != 0);
     Choice guessed = {-1, -1, 0.0};
     if (M->other || !known) {
         guessed = guess_panel(fl, M->tab, phase, M->w, h_max, M->h_mapped, M->start_switch, panel);

@@ -84,6 +84,17 @@ static bool is_mate(const Flow *fl, int s)
     return is_disc(fl, s) && (int)stop_of(fl, s)->beside < s;
 }
 
+/* whether nothing gives way before what slides over a plane, and the first row of it */
+static bool is_hard_disc(const Flow *fl, int s) { return is_disc(fl, s) && !is_sprung(fl, s); }
+
+static int first_tangent(const Flow *fl, int s)
+{
+    return is_mate(fl, s) ? (int)stop_of(fl, s)->beside : s;
+}
+
+/* whether it has just been let go: it has no speed yet */
+static bool is_let_go(const Flow *fl, int s) { return is_hard_disc(fl, s) && fl->slides[s] == LET_GO; }
+
 /* whether a row is the speed of a slider's place */
 static bool is_mover(const Flow *fl, int s) { return stop_of(fl, s)->moves >= 0.0; }
 

@@ -20,7 +20,7 @@ static bool is_many(const Flow *fl, const Panel *panel)
     if (panel->na * panel->m < (all ? FEWER : MANY) || panel->round) return false;
     for (int a = 0; a < panel->na; a++)
         if (is_held(fl, panel->active[a]) || is_bond(fl, panel->active[a]) ||
-            is_mover(fl, panel->active[a]))
+            is_disc(fl, panel->active[a]) || is_mover(fl, panel->active[a]))
             return false;
     return true;
 }

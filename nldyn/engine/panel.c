@@ -15,6 +15,7 @@
 #define LARGEST_ANGLE 1e5 /* that `fill_sines` is left to */
 #define ALONG 1e-9   /* of the cosine squared: a slider that moves as a stop does */
 #define ROUGH 3       /* steps in which the turning of friction over a plane is not led by forces */
+#define LEAVING 4      /* rounds of the guess of how what is let go over a plane leaves */
 #define STALE 0.1     /* rate from which its matrix is inverted anew */
 
 static bool is_many(const Flow *fl, const Panel *panel);
@@ -304,12 +305,20 @@ static void with_forces(const Panel *panel, const double *free, const double *fo
 }
 
 /* fill the rates of the outputs with what the guessed penetrations lead to without them */
-static void guess_rates(const Flow *fl, Panel *panel, Scratch *s)
+static void guess_rates(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel,
+                        Scratch *s)
 {
     int width = panel->na * panel->m, count = panel->outputs * panel->m;
     for (int p = width; p < count; p++) panel->output[p] = 0.0;
     panel_forces(fl, panel, s->new_slope);
     with_forces(panel, s->free, panel->F, width, panel->output);
+    for (int a = 0; a < panel->na; a++) {
+        if (!is_let_go(fl, panel->active[a]) || is_mate(fl, panel->active[a])) continue;
+        for (int round = 0; round < LEAVING; round++) {
+            guess_leaving(fl, tab, kind, h, panel, a);
+            with_forces(panel, s->free, panel->F, width, panel->output);
+        }
+    }
 }
 
 /* rounding error of stop a's force at node i by what all forces (na m,) have moved so far */
@@ -432,7 +441,7 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
     free_outputs(fl, tab, kind, phase, w, h, panel, s);
     if (many) return solve_many(fl, tab, noise, panel, s);
     panel->rough = true;
-    if (panel->outputs > panel->na) guess_rates(fl, panel, s);
+    if (panel->outputs > panel->na) guess_rates(fl, tab, kind, h, panel, s);
     bool discs = any_disc(fl, panel);
     double before = INFINITY;
     for (int iteration = 0; iteration < 60; iteration++) {

@@ -9,6 +9,7 @@
 
 static int disc_of(const Flow *fl, const Panel *panel, int a);
 static double show_disc_force(const Flow *fl, const Panel *panel, int a, double *shown);
+static double slowest_over(const Flow *fl, const Panel *panel, int a);
 static double disc_kick(const Flow *fl, const Panel *panel, int a, double h);
 static double forgotten(const Flow *fl, const Gauss *tab, int kind, double h, const Panel *panel,
                         int a);
@@ -205,6 +206,7 @@ static bool output_resolved(const Flow *fl, const Gauss *tab, int kind, double h
     const double *F = panel->F + (size_t)a * m;
     const double *depths = (is_round(fl, closed) ? panel->radial : panel->output) + (size_t)a * m;
     double deepest = deepest_of(fl, panel, a), strongest = largest_of(fl, panel, panel->F, a);
+    if (o >= na && is_let_go(fl, closed)) return true; /* its slope is infinite at the start */
     if (disc_of(fl, panel, a) >= 0) {
         strongest = show_disc_force(fl, panel, a, s->inner);
         F = s->inner;
@@ -229,6 +231,8 @@ static bool output_resolved(const Flow *fl, const Gauss *tab, int kind, double h
     if (o < na && legendre_tail(tab, F) > tail * strongest + shake) return false;
     shake *= stop->exponent / deepest * largest(tab->slope + (size_t)kind * m, m);
     Value slopes = slope_tail(fl, tab, panel, s->slopes, o);
+    if (o >= na && disc_of(fl, panel, a) >= 0 && is_hard_disc(fl, closed))
+        shake = BLIND * noise[o] * slopes.slope / slowest_over(fl, panel, a);
     double size = slopes.slope, fastest = largest_of(fl, panel, panel->output + (size_t)(o - a) * m, a);
     if (o >= na && fastest > 0.0) /* by speed: its share in the force counts */
         size = larger(size, strongest / fastest);
@@ -273,7 +277,7 @@ static bool shows_decay(const Flow *fl, const Gauss *tab, int kind, double h, Pa
         for (int i = 0; i < m; i++)
             total += h * tab->weights[kind * m + i] * (mobility * panel->slope[o * m + i]);
         if (disc_of(fl, panel, a) == panel->active[a])
-            total = panel->growth[a] > 0.0 ? 0.0 : forgotten(fl, tab, kind, h, panel, a);
+            total = forgotten(fl, tab, kind, h, panel, a);
         panel->decay[a] = total;
         bool faded = panel->decayed[a] > FADED && !is_planar(fl, panel->active[a]);
         shown = shown && (total <= DECAY || faded);

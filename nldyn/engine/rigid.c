@@ -185,9 +185,13 @@ static void contact_forces(const Motion *M, double phase)
         if (M->closed[s] && is_pressed(fl, s) && !is_strained(fl, s)) /* after what presses it on */
             forces[s] = sliding_law(fl, s, at.first, forces[(int)stop_of(fl, s)->normal]).force;
         if (M->closed[s] && slides_on_disc(fl, s)) {
-            int first = is_mate(fl, s) ? (int)stop_of(fl, s)->beside : s;
-            double u = disc_now(fl, first, M->w, phase).u[s != first];
-            forces[s] = u * grip(fl, s) * pressing_now(fl, s, M->w, phase).value;
+            int first = first_tangent(fl, s);
+            double u[2];
+            if (is_sprung(fl, s))
+                memcpy(u, disc_now(fl, first, M->w, phase).u, sizeof u);
+            else
+                fill_heading(M, first, phase, u);
+            forces[s] = u[s != first] * grip(fl, s) * pressing_now(fl, s, M->w, phase).value;
         }
     }
     for (int b = 0; b < n; b++)
@@ -527,8 +531,16 @@ static void loosen_slider(const Motion *M, int s, double phase, double roundings
         speed = round_slip(fl, s, M->w, phase).value;
         noise = round_slip_noise(fl, s, M->w, phase);
     }
-    if (fabs(speed) <= roundings * noise) return;
-    fl->slides[s] = speed > 0.0 ? 1 : -1;
+    if (is_disc(fl, s)) {
+        double both[2];
+        speed = speeds_over(fl, first_tangent(fl, s), M->w, phase, both);
+        noise = speeds_noise(fl, first_tangent(fl, s), M->w);
+    }
+    if (fabs(speed) <= roundings * noise && !(is_disc(fl, s) && slides_freely(fl, s))) return;
+    if (is_disc(fl, s))
+        set_slides(fl, s, 1);
+    else
+        fl->slides[s] = speed > 0.0 ? 1 : -1;
     M->panel->na = -1; /* its equations are others now */
 }
 
@@ -579,6 +591,34 @@ static bool any_sticks(const Motion *M)
     return false;
 }
 
+/* size of the force that holds a slider, over a plane along both tangents; s->stop_forces are filled */
+static double held_size(const Motion *M, int s)
+{
+    double force = held_force(M, s);
+    return is_disc(M->fl, s) ? hypot(force, held_force(M, (int)stop_of(M->fl, s)->beside))
+                             : fabs(force);
+}
+
+/* let a slider go that sticks; s->stop_forces are filled */
+static void let_go(const Motion *M, int s)
+{
+    const Flow *fl = M->fl;
+    M->panel->na = -1;
+    if (!is_disc(fl, s)) {
+        fl->slides[s] = held_force(M, s) > 0.0 ? 1 : -1;
+        return;
+    }
+    set_slides(fl, s, is_sprung(fl, s) ? 1 : LET_GO);
+    if (is_sprung(fl, s)) return;
+    int other = (int)stop_of(fl, s)->beside;
+    double held[2] = {held_force(M, s), held_force(M, other)}, both = between(fl, s, other), u[2];
+    double free[2] = {stop_of(fl, s)->mobility * held[0] + both * held[1],
+                      stop_of(fl, other)->mobility * held[1] + both * held[0]};
+    fill_leaving(fl, s, free, grip(fl, s) * larger(held_on(M, s), 0.0), u);
+    M->s->heading[s] = u[0];
+    M->s->heading[other] = u[1];
+}
+
 /* let sliders slide that would need more than their friction to stick, the most loaded first; all, or
  * those alone that rigid stops press on */
 static void slip_of(const Motion *M, double phase, bool all)
@@ -590,17 +630,16 @@ static void slip_of(const Motion *M, double phase, bool all)
         if (!any_sticks(M)) return;
         contact_forces(M, phase);
         for (int s = 0; s < fl->n_stops; s++) {
-            if (!is_stuck(M, s)) continue;
+            if (!is_stuck(M, s) || is_mate(fl, s)) continue;
             int pressing = (int)(is_second(fl, s) ? stop_of(fl, s)->lead : stop_of(fl, s)->normal);
             if (!all && !(pressing >= 0 && is_rigid(fl, pressing))) continue;
-            double load = fabs(held_force(M, s)) / (grip(fl, s) * larger(held_on(M, s), 0.0));
+            double load = held_size(M, s) / (grip(fl, s) * larger(held_on(M, s), 0.0));
             if (!(load > most)) continue;
             most = load;
             loosest = s;
         }
         if (loosest < 0) return;
-        fl->slides[loosest] = held_force(M, loosest) > 0.0 ? 1 : -1;
-        M->panel->na = -1;
+        let_go(M, loosest);
     }
 }
 
@@ -647,7 +686,8 @@ static void jump_to(Motion *M, int s, int way, double phase, double t, const dou
         state_rate(M);
         move(M, 1.0, shift);
     }
-    M->fl->slides[s] = way;
+    set_slides(M->fl, s, way);
+    if (is_disc(M->fl, s)) hold(M, phase, t, shift); /* across its speed, too, though it turns */
     slip_overloaded(M, phase);
     hold(M, phase, t, shift);
     if (!M->with_columns) return;
@@ -671,21 +711,30 @@ static void slide_or_stick(Motion *M, int s, double phase, double t)
     }
     for (int c = 0; c < M->n_columns; c++) shift[c] = 0.0;
     if (fl->slides[s] == 0) {
-        int way = held_force(M, s) > 0.0 ? 1 : -1;
         if (drops_at_once(fl, s)) {
+            int way = held_force(M, s) > 0.0 ? 1 : -1;
             if (M->with_columns) slip_shift(M, s, way, phase, shift);
             jump_to(M, s, way, phase, t, shift);
-            return;
+        } else {
+            let_go(M, s);
         }
-        fl->slides[s] = way;
-        if (is_disc(fl, s)) set_slides(fl, s, 1);
         return;
     }
-    double pace = held_pace(M, s, M->s->pushes, phase);
-    if (M->with_columns) {
-        held_columns(M, s, phase, t, shift, M->s->sliding);
-        for (int c = 0; c < M->n_columns; c++) shift[c] = -M->s->sliding[c] / pace;
+    RowsAlong along = {1, {s}, {1.0}};
+    if (is_hard_disc(fl, s)) {
+        along = (RowsAlong){2, {s, (int)stop_of(fl, s)->beside}, {0.0}};
+        fill_heading(M, s, phase, along.share);
     }
+    double pace = is_disc(fl, s) ? sum_along(along, M->s->pushes)
+                                 : held_pace(M, s, M->s->pushes, phase);
+    double *sum = M->s->along_columns;
+    for (int c = 0; c < M->n_columns; c++) sum[c] = 0.0;
+    for (int d = 0; d < along.count && M->with_columns; d++) {
+        held_columns(M, along.row[d], phase, t, shift, M->s->sliding);
+        for (int c = 0; c < M->n_columns; c++)
+            sum[c] -= along.share[d] * M->s->sliding[c] / pace;
+    }
+    memcpy(shift, sum, sizeof(double) * M->n_columns);
     jump_to(M, s, 0, phase, t, shift);
 }
 

@@ -14,6 +14,15 @@ static void fill_held(const Motion *M, double phase, double *held)
         held[s] = any && is_stuck(M, s) && is_slider(M->fl, s) ? M->s->stop_forces[s] : NAN;
 }
 
+/* friction of what slides, along a row, per unit of the normal force */
+static double sliding_share(const Motion *M, int s, double phase)
+{
+    double u[2];
+    if (!is_disc(M->fl, s)) return friction_at(M->fl, s, output_now(M->fl, s, M->w, phase).first).value;
+    fill_heading(M, first_tangent(M->fl, s), phase, u);
+    return u[is_mate(M->fl, s)] * grip(M->fl, s);
+}
+
 /* Change of the sensitivities as a dashpot begins or ceases to act, a time t after the start.
  *
  * The force jumps by c δ', and the switch moves by -dδ/δ' with the penetration there: together
@@ -29,7 +38,7 @@ static void jump_columns(Motion *M, int stop, double phase, double t, bool close
     depth_columns(M, stop, phase, t, depth);
     for (int s = 0; s < fl->n_stops; s++) {
         bool slides = is_slider(fl, s) && fl->slides[s] != 0;
-        double share = slides ? friction_at(fl, s, output_now(fl, s, M->w, phase).first).value : 1.0;
+        double share = slides ? sliding_share(M, s, phase) : 1.0;
         double jump = (closes ? dashpot : -dashpot) * share; /* of the force, over the speed */
         if (slides && !isnan(held[s]))
             jump = (share * pressing_now(fl, s, M->w, phase).value - held[s]) / speed;
@@ -206,7 +215,8 @@ static void carry_depths(Motion *M, double here)
     for (int a = 0; a < panel->na; a++) { /* a strain that is none may grow at any rate */
         int s = panel->active[a];
         panel->growth[a] = 0.0;
-        if (disc_of(M->fl, panel, a) != s) continue;
+        if (is_let_go(M->fl, s)) panel->decayed[a] = 2.0 * FADED; /* there is nothing to forget */
+        if (disc_of(M->fl, panel, a) != s || !is_sprung(M->fl, s)) continue;
         int other = place_of(panel, (int)stop_of(M->fl, s)->beside);
         Disc at = disc_now(M->fl, s, M->w, here);
         if (at.size > 0.0) continue;
@@ -232,9 +242,10 @@ static int take_panel(Motion *M, double here, const Trial *trial)
     if (!end_is_finite(M)) return CONTACT_FAILED;
     if (M->recording && !record_panel(M, here, h, trial->kind, trial->aim)) return RECORD_FULL;
     for (int a = 0; a < panel->na; a++) {
-        if (HALF_ULP * panel->decay[a] > WORST_ROUNDING) return ROUNDED;
+        bool turns = is_disc(fl, panel->active[a]);
+        if (HALF_ULP * panel->decay[a] > WORST_ROUNDING && !turns) return ROUNDED;
         panel->decayed[a] += panel->decay[a];
-        if (panel->decay[a] > DECAY && !is_disc(fl, panel->active[a]))
+        if (panel->decay[a] > DECAY && !turns)
             M->last_push[panel->active[a]] = at_end(M->tab, panel->F + (size_t)a * panel->m);
     }
     if (M->with_columns)
@@ -249,7 +260,29 @@ static int take_panel(Motion *M, double here, const Trial *trial)
         M->doubt[panel->active[a]] = panel->end_doubt[a];
     }
     drag_places(M, M->phase + fl->omega * M->t, M->t);
+    for (int s = 0; s < fl->n_stops; s++)
+        if (is_let_go(fl, s) && !is_mate(fl, s) && moves_over(M, s)) set_slides(fl, s, 1);
     return GOES_ON;
+}
+
+/* Time that a panel may take before what slides over a plane comes to rest, or inf; what does so now
+ * is `resting`, or -1. */
+static double time_before_rest(const Motion *M, double here, int *resting)
+{
+    const Flow *fl = M->fl;
+    double first = INFINITY;
+    bool filled = false;
+    *resting = -1;
+    for (int s = 0; s < fl->n_stops; s++) {
+        bool slides = M->closed[s] && is_hard_disc(fl, s) && !is_mate(fl, s) && fl->slides[s] == 1;
+        if (!slides || slides_freely(fl, s)) continue;
+        if (!filled) contact_forces(M, here);
+        filled = true;
+        double left = time_to_rest(M, s, here);
+        if (!moves_over(M, s) || left <= AT_REST * M->shortest) *resting = s;
+        first = smaller(first, NEARER * left);
+    }
+    return first;
 }
 
 /* go on by a contact panel with na closed stops in M->active */
@@ -264,7 +297,13 @@ static int touch(Motion *M, double here, int na)
         bool passed = pass_touch(M, stop, here, &status);
         if (passed || status != GOES_ON) return status;
     }
-    double h_max = smaller(remain, M->start_switch == 1 ? M->h_mapped : M->h_even);
+    int resting;
+    double h_max = smaller(remain, time_before_rest(M, here, &resting));
+    if (resting >= 0) {
+        pass_event(M, resting, 0.0);
+        return GOES_ON;
+    }
+    h_max = smaller(h_max, M->start_switch == 1 ? M->h_mapped : M->h_even);
     h_max = smaller(h_max, M->reach);
     carry_depths(M, here);
     Trial trial;

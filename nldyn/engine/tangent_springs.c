@@ -56,7 +56,7 @@ static double drag_speed(const Flow *fl, int s, int way, const double *w, double
 {
     const Stop *slider = stop_of(fl, s);
     double speed = output_now(fl, s, w, phase).first - slider->belt;
-    if (is_disc(fl, s) && way != 0) return disc_now(fl, s, w, phase).along;
+    if (is_disc(fl, s) && is_sprung(fl, s) && way != 0) return disc_now(fl, s, w, phase).along;
     if (!is_sprung(fl, s) || !is_pressed(fl, s) || way == 0) return speed;
     double pace = depth_now(fl, (int)slider->normal, w, phase).first;
     double growth = pressing_now(fl, s, w, phase).slope * pace;
@@ -68,6 +68,7 @@ static double drag_noise(const Flow *fl, int s, const double *w, double phase)
 {
     const Stop *slider = stop_of(fl, s);
     double noise = rate_noise(fl, s, w);
+    if (is_hard_disc(fl, s)) return noise + rate_noise(fl, (int)slider->beside, w);
     if (is_disc(fl, s)) {
         int other = (int)slider->beside;
         Disc at = disc_now(fl, s, w, phase);
@@ -149,7 +150,10 @@ static bool any_sprung(const Flow *fl)
 }
 
 /* whether a slider has no friction, so that nothing tells which way it slides */
-static bool slides_freely(const Flow *fl, int s) { return is_sprung(fl, s) && grip(fl, s) == 0.0; }
+static bool slides_freely(const Flow *fl, int s)
+{
+    return (is_sprung(fl, s) || is_disc(fl, s)) && grip(fl, s) == 0.0;
+}
 
 /* add to a row of sensitivities (n_columns,) `factor` times what presses a slider on changes by */
 static void add_pressing_columns(const Motion *M, int s, double factor, double phase, double t,

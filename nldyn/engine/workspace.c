@@ -152,6 +152,7 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     s->first_pushes = numbers(block, na);
     s->held = numbers(block, na);
     s->drags = numbers(block, na);
+    s->heading = numbers(block, na);
     s->across = numbers(block, na);
     s->outward = numbers(block, na);
     s->mobility = numbers(block, na * na);

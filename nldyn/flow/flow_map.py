@@ -292,9 +292,9 @@ class FlowMap:
         s = self.system
         between = [(e.at, e.against) for e in s.sliders] + [(e.at, e.against) for e in s.bonds]
         between += [stop.ends[1] for stop in s.round_stops.values()]
-        first = [(s.sliders[i].at, s.sliders[i].against) for i in s.over_planes]
-        across = list(s.place_ends[len(s.sprung) :])
-        between += across + [ends for pair in zip(first, across, strict=True) for ends in pair]
+        planes = [s.sliders[i] for i in s.over_planes]
+        between += [slider.ends[1] for slider in planes]
+        between += [ends for i in s.over_planes if i in s.sprung for ends in s.sliders[i].ends]
         return [s.stop_vector(stop) for stop in s.stops] + [s.vector_between(*e) for e in between]
 
     @cached_property
@@ -359,17 +359,20 @@ class FlowMap:
 
     @cached_property
     def plane_rows(self) -> dict[int, list[int]]:
-        """The outputs of sliders over a plane: along both tangents, then those of their movers.
+        """The outputs of sliders over a plane: along both tangents, and of movers behind springs.
 
         What a mover pushes is the place of the slider, by the speed at which that goes.
         """
         s = self.system
-        numbers = s.over_planes
         second = len(s.stops) + len(s.sliders) + len(s.bonds) + len(s.round_stops)
-        movers = range(second + len(numbers), second + 3 * len(numbers), 2)
+        movers = itertools.count(second + len(s.over_planes))
         return {
-            number: [len(s.stops) + number, second + i, *range(mover, mover + 2)]
-            for i, (number, mover) in enumerate(zip(numbers, movers, strict=True))
+            number: [
+                len(s.stops) + number,
+                second + i,
+                *itertools.islice(movers, 2 if number in s.sprung else 0),
+            ]
+            for i, number in enumerate(s.over_planes)
         }
 
     @cached_property
@@ -377,7 +380,7 @@ class FlowMap:
         """For each place the outputs of its strain: of its slider and, over a plane, its mover."""
         s, planes = self.system, self.plane_rows
         first = [[len(s.stops) + i, *planes.get(i, [])[2:3]] for i in s.sprung]
-        return first + [[second, mover] for _, second, _, mover in planes.values()]
+        return first + [[planes[i][1], planes[i][3]] for i in s.sprung if i in planes]
 
     @cached_property
     def round_rows(self) -> dict[int, list[int]]:
@@ -474,18 +477,17 @@ class FlowMap:
 
     def _plane_stops(self, stops: list[StopRow]) -> list[StopRow]:
         """Rows of second tangents and movers; first tangents, in `stops`, are told of theirs."""
-        more = 2 * (self.system.size + len(self.system.sprung))
+        places = itertools.count(2 * (self.system.size + len(self.system.sprung)), 2)
         seconds, movers = [], []
-        for i, (number, (first, second, *both)) in enumerate(self.plane_rows.items()):
-            slider = self.system.sliders[number]
-            for of, other, mover in ((first, second, both[0]), (second, first, both[1])):
-                v = self._pushed[of]
-                row = stops[first]._replace(beside=float(other), mover=float(mover))
-                if of == first:
-                    stops[first] = row
-                else:
-                    seconds.append(second_tangent_row(row, slider, float(v @ v), more + 2 * i))
-                movers.append(mover_row(of, float(v @ v)))
+        for number, (first, second, *both) in self.plane_rows.items():
+            slider, (own, other) = self.system.sliders[number], both or (-1, -1)
+            mobility = [float(self._pushed[of] @ self._pushed[of]) for of in (first, second)]
+            place = next(places) if both else -1
+            row = second_tangent_row(stops[first], slider, mobility[1], place)
+            seconds.append(row._replace(beside=float(first), mover=float(other)))
+            stops[first] = stops[first]._replace(beside=float(second), mover=float(own))
+            pairs = zip((first, second), mobility, strict=True)
+            movers += [mover_row(of, size) for of, size in pairs if both]
         return seconds + movers
 
     def shoot(

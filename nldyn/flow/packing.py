@@ -137,6 +137,8 @@ def slider_row(slider: Slider, mobility: float, options: FlowOptions, place: int
 
 def second_tangent_row(first: StopRow, slider: Slider, mobility: float, place: int) -> StopRow:
     """Numbers of the second tangent of a slider over a plane, by those of its first one."""
+    if slider.tangential_stiffness is None:
+        return first._replace(mobility=mobility, belt=slider.friction.base_speeds[1])
     return first._replace(
         mobility=mobility,
         place=float(place),

@@ -172,7 +172,7 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
     first = len(system.stops)
     rubs = np.zeros((len(phases), first))  # friction per unit of the force of a rigid stop
     holds = np.zeros((len(phases), len(system.sliders)), dtype=bool)
-    for number, (*tangents, _, _) in flow.plane_rows.items():
+    for number, (*tangents, _, _) in flow.plane_rows.items():  # behind springs, beside rigid stops
         slider = system.sliders[number]
         pulled = (slider.tangential_stiffness or 0.0) * states @ flow.rows[tangents].T
         most = slider.friction.coefficient * _normal_force(flow, slider, states)

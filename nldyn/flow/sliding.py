@@ -163,6 +163,8 @@ def _plane_measures(motion: Trajectory, number: int, ends: Real) -> SliderMeasur
     """
     flow, rec, tables = motion.flow, motion.record, motion.flow.tables
     slider, (first, second, *movers) = flow.system.sliders[number], flow.plane_rows[number]
+    if not movers:
+        return _hard_plane_measures(motion, number, ends)
     rows, spring = [first, second], slider.tangential_stiffness or 0.0
     panels = np.flatnonzero(rec.kind >= 0)
     if slider.stop >= 0:
@@ -185,6 +187,29 @@ def _plane_measures(motion: Trajectory, number: int, ends: Real) -> SliderMeasur
     mu, largest = slider.friction.coefficient, peaks(np.hypot(*np.moveaxis(fine, 1, 0)))
     pressed = loss / mu if mu > 0.0 else _pressed_way(motion, slider, sliding, way)
     return _measures(motion, slider, largest, distance, duration, slides, loss, pressed)
+
+
+def _hard_plane_measures(motion: Trajectory, number: int, ends: Real) -> SliderMeasures:
+    """The same without a spring, by the ways along both tangents."""
+    flow, rec = motion.flow, motion.record
+    slider, rows = flow.system.sliders[number], flow.plane_rows[number]
+    panels = np.flatnonzero(rec.kind >= 0)
+    if slider.stop >= 0:
+        panels = _touching(motion, slider.stop)
+    slides = ~held_in_pieces(motion, number)[panels]
+    sliding, duration = panels[slides], rec.duration[panels]
+    places = ends @ flow.rows[rows].T
+    times, moved = _times_of_nodes(motion, sliding), []
+    for tangent, (row, belt) in enumerate(zip(rows, slider.friction.base_speeds, strict=True)):
+        at, inner = places[:, tangent], rec.depth[sliding, row]
+        values = np.column_stack([at[sliding], inner, at[sliding + 1]])
+        moved.append(flow.tables.ways(values) - belt * times)
+    way, force = np.hypot(*moved), np.hypot(*np.moveaxis(rec.force[panels][:, rows], 1, 0))
+    pressed = _pressed_way(motion, slider, sliding, way)
+    fine = rec.force[panels][:, rows] @ fine_table(flow.tables.nodes.size).T
+    largest = peaks(np.hypot(*np.moveaxis(fine, 1, 0)))
+    loss = float((force[slides] * way).sum())
+    return _measures(motion, slider, largest, float(way.sum()), duration, slides, loss, pressed)
 
 
 def _pressed_way(motion: Trajectory, slider: Slider, panels: NDArray[np.intp], way: Real) -> float:
@@ -292,10 +317,10 @@ def held_in_pieces(motion: Trajectory, number: int) -> NDArray[np.bool_]:
     Where one is held its output is no displacement but the acceleration that the force takes away.
     """
     flow, rec = motion.flow, motion.record
-    output = len(flow.system.stops) + number
+    outputs = flow.plane_rows.get(number, [len(flow.system.stops) + number])
     if number in flow.system.sprung:
         return np.zeros(rec.phase.size, dtype=bool)
-    mobility = float(flow.mobility([output])[0, 0])
-    inner = rec.depth[:, output]
-    off = np.abs(inner - mobility * rec.force[:, output]).max(axis=1)
-    return np.asarray(off <= ALIKE * np.abs(inner).max(axis=1))
+    mobility = np.diag(flow.mobility(outputs))[:, None]
+    inner = rec.depth[:, outputs]
+    off = np.abs(inner - mobility * rec.force[:, outputs]).max(axis=(1, 2))
+    return np.asarray(off <= ALIKE * np.abs(inner).max(axis=(1, 2)))

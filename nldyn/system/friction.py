@@ -138,17 +138,8 @@ def across_of(second: str | None, against: str | None) -> Across:
     return None if second is None and against is None else (second, against)
 
 
-def check_plane(
-    owner: str,
-    first: tuple[str | None, ...],
-    across: Across,
-    stiffness: float | None,
-    law: Friction,
-) -> None:
-    """Refuse a second tangent that is no interface of its own, or has no spring before it.
-
-    And that of what it slides on, without a second tangent.
-    """
+def check_plane(owner: str, first: tuple[str | None, ...], across: Across, law: Friction) -> None:
+    """Refuse a second tangent that is no interface of its own, and a base without one along it."""
     if across is None:
         if isinstance(law.base_speed, tuple):
             raise SystemModelError(f"{owner}: a base_speed of two needs a second_tangent")
@@ -159,10 +150,10 @@ def check_plane(
         raise SystemModelError(f"{owner}: second_tangent_against needs a second_tangent")
     if across[0] in (*first, across[1]):
         raise SystemModelError(f"{owner}: second_tangent must be another interface")
-    if stiffness is None:
+    if law.adhesion:
         raise SystemModelError(
-            f"{owner}: friction with a second_tangent needs a tangential_stiffness: without a "
-            "spring the force of what comes to rest in a plane has no direction"
+            f"{owner}: friction with a second_tangent has one coefficient, at rest and sliding: "
+            "leave out at_rest and fading_speed"
         )
 
 
@@ -189,8 +180,8 @@ class DryFriction:
         one interface are an Iwan chain. Without it nothing gives way.
     second_tangent : str, optional
         Interface at the same place, perpendicular to `at`, of what slides over a plane: its force
-        is μ N along the strain of the spring, in any direction of the plane. It needs a
-        `tangential_stiffness`, which is the same in all directions.
+        is μ N against its speed, in any direction of the plane, or along the strain of the spring.
+        That is as stiff in all directions.
     second_tangent_against : str, optional
         The same interface of what it slides on; the ground unless given.
 
@@ -227,7 +218,7 @@ class DryFriction:
         object.__setattr__(self, "friction", as_friction(owner, self.friction))
         check_spring(owner, self.tangential_stiffness, self.law)
         ends = (self.at, self.against)
-        check_plane(owner, ends, self.across, self.tangential_stiffness, self.law)
+        check_plane(owner, ends, self.across, self.law)
 
     @property
     def law(self) -> Friction:

@@ -312,8 +312,8 @@ class Stop:
         gives way. Without it nothing does.
     second_tangent : str, optional
         Interface at the same place along the surface, perpendicular to `tangent`: the body slides
-        over the plane of both, and the force of friction is against its sliding there. It needs a
-        `tangential_stiffness`, which is the same in all directions.
+        over the plane of both, and the force of friction is against its sliding there. A
+        `tangential_stiffness` is the same in all directions.
     second_tangent_against : str, optional
         The same interface of what is on the other side; the ground unless given.
 
@@ -396,7 +396,7 @@ class Stop:
         object.__setattr__(self, "friction", law)
         check_spring(owner, self.tangential_stiffness, law)
         first = (self.at, self.against, *ends)
-        check_plane(owner, first, across, self.tangential_stiffness, law)
+        check_plane(owner, first, across, law)
         beside = self.second_tangent_against
         check_other_side(owner, "second_tangent_against", beside, self.against)
 

@@ -505,21 +505,26 @@ class System:
 
     @cached_property
     def over_planes(self) -> tuple[int, ...]:
-        """Numbers of the sliders that slide over a plane: they have two tangents, and places."""
+        """Numbers of the sliders that slide over a plane: they have two tangents."""
         return tuple(i for i, slider in enumerate(self.sliders) if slider.across is not None)
 
     @cached_property
     def place_ends(self) -> tuple[tuple[str, str | None], ...]:
         """Interfaces of the places in the state: of `sprung`, then along second tangents."""
         first = [(self.sliders[i].at, self.sliders[i].against) for i in self.sprung]
-        across = [self.sliders[i].across for i in self.over_planes]
-        return (*first, *((at, against) for at, against in filter(None, across) if at is not None))
+        across = [self.sliders[i].ends[1] for i in self.sprung if i in self.over_planes]
+        return (*first, *across)
 
     @property
     def loses_by_speed(self) -> bool:
         """Whether a force of a stop or bond depends on the speed."""
         lossy = [stop.depends_on_speed for stop in self.stops]
         return bool(self.sliders) or any(lossy + [bond.depends_on_speed for bond in self.bonds])
+
+    @cached_property
+    def movers(self) -> int:
+        """Number of the forces that move places over a plane: two of each one behind a spring."""
+        return 2 * sum(i in self.sprung for i in self.over_planes)
 
     def unit(self, interface: str) -> str:
         """Unit of the displacement of an interface: m, or rad of a rotation."""
@@ -529,11 +534,11 @@ class System:
         """Number of the displacement of an interface among the outputs of a flow map.
 
         Before it come the penetrations of the stops, the displacements of sliders and bonds, and
-        those along the second directions of round clearances, then three of each slider over a
-        plane.
+        those along the second directions of round clearances and the second tangents of sliders,
+        then `movers`.
         """
         acting = len(self.stops) + len(self.sliders) + len(self.bonds) + len(self.round_stops)
-        acting += 3 * len(self.over_planes)
+        acting += len(self.over_planes) + self.movers
         return acting + self.interfaces.index(interface)
 
     @property
@@ -1032,6 +1037,11 @@ class System:
                 )
         for number in self.over_planes:
             slider = self.sliders[number]
+            if self.rigid_stops and number not in self.sprung:
+                raise SystemModelError(
+                    f"friction at '{slider.at}' over a plane needs a tangential_stiffness beside "
+                    "rigid stops: what an impact makes of sliding over a plane is not told"
+                )
             if _one_motion(*(self.vector_between(*ends) for ends in slider.ends)):
                 raise SystemModelError(
                     f"friction at '{slider.at}' acts over no plane with '{slider.ends[1][0]}': in "
@@ -1069,7 +1079,7 @@ class System:
         if self.size > 1:  # in one mode all directions are one motion
             self._check_normals()
         for together in self._sliders_at_once() if self.sliders else ():
-            rows = [self.vector_between(s.at, s.against) for s in together]
+            rows = [self.vector_between(*ends) for slider in together for ends in slider.ends]
             if _rank(rows, self.size) < len(rows):
                 names = ", ".join(f"'{s.at}'" for s in together)
                 raise SystemModelError(

@@ -156,7 +156,7 @@ class FrictionTable(TwoEnds):
     Several tables at one interface are an Iwan chain. Without it nothing gives way."""
     second_tangent: str | None = None
     """Interface at the same place along the surface, perpendicular to `at`: it slides over the
-    plane of both. Needs a `tangential_stiffness`, which is the same in all directions."""
+    plane of both. A `tangential_stiffness` is the same in all directions."""
     second_tangent_against: str | None = None
     """The same interface at the other side; the ground unless given."""
 
@@ -173,8 +173,8 @@ class FrictionTable(TwoEnds):
             raise ValueError("has a 'base_speed' of two, which needs a 'second_tangent'")
         if self.second_tangent is None and self.second_tangent_against is not None:
             raise ValueError("has a 'second_tangent_against', which needs a 'second_tangent'")
-        if self.second_tangent is not None and self.tangential_stiffness is None:
-            raise ValueError("has a 'second_tangent', which needs a 'tangential_stiffness'")
+        if self.second_tangent is not None and (self.at_rest or 0.0) > self.coefficient:
+            raise ValueError("has a 'second_tangent', over which 'at_rest' is no other one")
         if self.second_tangent is not None and self.second_tangent in (
             self.at,
             self.against,

@@ -292,8 +292,7 @@ class ContactAreaTable(Table):
     tangential_stiffness: Positive | None = None
     """[N/m per m², m or point] Stiffness of a spring along the surface before what slides."""
     second_along: Axis | Triple | Annotated[list[str], Field(min_length=1)] | None = None
-    """The same as `along` perpendicular to it, of points that slide over the plane of both. Needs
-    a `tangential_stiffness`."""
+    """The same as `along` perpendicular to it, of points that slide over the plane of both."""
 
     @model_validator(mode="after")
     def _one_law(self) -> Self:
@@ -307,8 +306,8 @@ class ContactAreaTable(Table):
             raise ValueError("needs both 'friction' and 'along', or neither")
         if self.along is None and self.tangential_stiffness is not None:
             raise ValueError("has a 'tangential_stiffness', which needs 'friction' and 'along'")
-        if self.second_along is not None and self.tangential_stiffness is None:
-            raise ValueError("has 'second_along', which needs 'along' and a 'tangential_stiffness'")
+        if self.along is None and self.second_along is not None:
+            raise ValueError("has 'second_along', which needs 'friction' and 'along'")
         if not self.pulls and not self.dashpot:
             raise ValueError("has 'pulls = false', which needs a 'dashpot' above 0")
         return self

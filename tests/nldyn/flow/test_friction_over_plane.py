@@ -310,13 +310,8 @@ def test_friction_of_zero_over_a_plane_changes_nothing():
 @pytest.mark.parametrize(
     ("make", "told"),
     [
-        (lambda: DryFriction("x", 1.0, 0.3, second_tangent="y"), "needs a tangential_stiffness"),
         (lambda: DryFriction("x", 1.0, 0.3, None, 5.0, "x"), "another interface"),
         (lambda: DryFriction("x", 1.0, 0.3, None, 5.0, None, "y"), "needs a second_tangent"),
-        (
-            lambda: Stop("x", 1.0, tangent="y", friction=0.3, second_tangent="z"),
-            "needs a tangential_stiffness",
-        ),
         (lambda: Stop("x", 1.0, second_tangent="z"), "needs both friction and tangent"),
         (
             lambda: Stop("x", 1.0, tangent="y", friction=0.3, tangential_stiffness=5.0,

@@ -133,8 +133,8 @@ def test_friction_beside_an_area_with_friction_is_followed_by_its_own_number(tmp
         ("weights = [0.5, 0.25]", "tangential_stiffness = 1.0", "needs 'friction' and 'along'"),
         (
             "weights = [0.5, 0.25]",
-            'friction = 0.1\nalong = ["tip", "tip"]\nsecond_along = ["slide", "slide"]',
-            "needs 'along' and a 'tangential_stiffness'",
+            'second_along = ["slide", "slide"]',
+            "'second_along', which needs 'friction' and 'along'",
         ),
     ],
 )

@@ -180,6 +180,12 @@ def test_a_second_tangent_makes_friction_over_a_plane(tmp_path):
         "pressed on by stop 0"
     )
     assert system.output("along") == 2 + 2 + 3 + system.interfaces.index("along")
+    text = (tmp_path / "scene.toml").read_text().replace("tangential_stiffness = 20.0", "")
+    text = text.replace('law = "rigid"\nrestitution = 0.5', "stiffness = 9.0")
+    (tmp_path / "hard.toml").write_text(text)
+    system = build_system(load_scene(tmp_path / "hard.toml"))
+    assert (system.sliders[0].across, system.sprung) == (("aside", None), ())
+    assert system.output("along") == 2 + 2 + 1 + system.interfaces.index("along")
 
 
 @pytest.mark.parametrize(
@@ -190,7 +196,13 @@ def test_a_second_tangent_makes_friction_over_a_plane(tmp_path):
         (over_a_plane(stop=1), "is not for stop 1, which is rigid"),
         (
             over_a_plane().replace("tangential_stiffness = 20.0", ""),
-            "'second_tangent', which needs a 'tangential_stiffness'",
+            "needs a tangential_stiffness beside rigid stops",
+        ),
+        (
+            over_a_plane().replace(
+                "tangential_stiffness = 20.0", "at_rest = 0.4\nfading_speed = 1.0"
+            ),
+            "'second_tangent', over which 'at_rest' is no other one",
         ),
     ],
 )
