@@ -10,7 +10,7 @@ from nldyn.base.errors import check_choice
 from nldyn.orbits.history import told
 from nldyn.system.chart import FREQUENCY, parameter_name, unit_of, unit_within, words_of
 from nldyn.system.naming import is_angle, moment_unit
-from nldyn.system.parameters import Parameter
+from nldyn.system.parameters import OF_SLIDERS, Parameter
 from nldyn.system.system import System
 
 LENGTHS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
@@ -33,6 +33,8 @@ class Along:
         The unit that is told, in SI units.
     unit : str
         Its name, empty for a number without one.
+    at : str
+        Interface of what slides, where several do.
 
     Examples
     --------
@@ -45,14 +47,17 @@ class Along:
     parameter: Parameter
     factor: float = 1.0
     unit: str = "Hz"
+    at: str = ""
 
     @classmethod
     def of(cls, parameter: Parameter, largest: float, system: System | None = None) -> Along:
         """For values up to a largest one; of a system, whose stops may act on rotations."""
         unit = unit_of(parameter) if system is None else unit_within(system, parameter)
+        several = system is not None and parameter.name in OF_SLIDERS and len(system.sliders) > 1
+        at = system.sliders[parameter.index].at if system is not None and several else ""
         if unit in PREFIXED:
-            return cls(parameter, *axis_unit(largest, PREFIXED[unit]))
-        return cls(parameter, 1.0, "" if unit == "1" else unit)
+            return cls(parameter, *axis_unit(largest, PREFIXED[unit]), at)
+        return cls(parameter, 1.0, "" if unit == "1" else unit, at)
 
     @property
     def in_frequency(self) -> bool:
@@ -67,6 +72,8 @@ class Along:
     @property
     def noun(self) -> str:
         """What changes."""
+        if self.at:
+            return f"{words_of(Parameter(self.parameter.name))} of '{self.at}'"
         return words_of(self.parameter)
 
     @property
@@ -81,8 +88,12 @@ class Along:
 
     def told(self, value: float, digits: int = 5) -> str:
         """A value in words."""
-        name = "" if self.in_frequency else f"{self.noun} "
+        name = "" if self.in_frequency else f"{self.noun} {'' if self.unit else '= '}"
         return f"{name}{self.number(value, digits=digits)}"
+
+    def beside(self, value: float, digits: int = 5) -> str:
+        """A value behind the frequency of an orbit; empty where it is that."""
+        return "" if self.in_frequency else f", {self.told(value, digits)}"
 
     def number(self, *values: float, digits: int = 5, sep: str = ", ") -> str:
         """Values with their unit."""

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from nldyn.base.errors import SceneError
 from nldyn.plot.contact import plot_friction_loss, plot_pressure, plot_wear_around
 from nldyn.plot.diagram import file_figure
+from nldyn.plot.words import Along
 from nldyn.scene.contact import areas_found
 
 if TYPE_CHECKING:
@@ -40,19 +41,21 @@ def contact_figure(diagram: Diagram, scene: Scene | None = None) -> Figure | Non
     matplotlib.figure.Figure or None
         None where there are neither areas nor friction, or nothing is touched and nothing slides.
     """
-    orbits = [orbit for branch in diagram.branches for orbit in branch.points]
-    system = orbits[0].system if orbits else None
+    nodes = [node for branch in diagram.branches for node in branch.nodes]
+    system = nodes[0].orbit.system if nodes else None
     if system is None or not (system.areas or system.rubbing):
         return None
-    size = _lost if any(map(_lost, orbits)) else _pressed
-    orbit = max(orbits, key=size)
-    if size(orbit) == 0.0:
+    size = _lost if any(_lost(node.orbit) for node in nodes) else _pressed
+    node = max(nodes, key=lambda node: size(node.orbit))
+    if size(node.orbit) == 0.0:
         return None
-    parts = _parts(orbit, _where(scene))
+    parts = _parts(node.orbit, _where(scene))
+    along = Along.of(diagram.parameter, max(map(abs, diagram.limits)), system)
     figure = file_figure(SIZE[0], SIZE[1] * len(parts))
     axes = figure.subplots(len(parts), squeeze=False)[:, 0].tolist()
     for part, ax in zip(parts, axes, strict=True):
         part(ax=ax)
+        ax.set_title(ax.get_title() + along.beside(node.value), parse_math=False)
     return figure
 
 

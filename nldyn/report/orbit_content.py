@@ -163,7 +163,6 @@ def orbit_content(
     ``fault``, and then the rest is missing.
     """
     orbit, value = chosen.orbit, axis.value(chosen.orbit)
-    place = "" if along.in_frequency else f", {along.told(value, 7)}"
     told = {
         "branch": chosen.branch,
         "place": chosen.place,
@@ -173,7 +172,7 @@ def orbit_content(
         "hz": float(orbit.frequency_hz),
         "x": float(value) / along.factor,
         "y": float(orbit.max_abs_displacement),
-        "title": orbit_title(orbit, digits=7) + place,
+        "title": orbit_title(orbit, digits=7) + along.beside(value, 7),
         "walls": stop_places(orbit.system, orbit.observe),
         "stable": bool(orbit.stable),
     }

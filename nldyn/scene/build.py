@@ -471,7 +471,7 @@ def _check_rides(scene: Scene, system: System) -> None:
     for table, number, at, against in scene.ties if bases else ():
         some, other = (_carried(scene, system, end) for end in (at, against))
         if carried_apart(bases, some, other):
-            told = told_apart(table, number, at, against)
+            told = told_apart(f"{table}[{number}]", at, against)
             raise scene_error(scene.file, (), told, sep=": ")
 
 

@@ -88,7 +88,7 @@ def _rough(scene: Scene, stops: list[AnyStop]) -> tuple[AnyStop, ...]:
             fault = f"is not for stop {table.stop}, which is rigid and has no spring along a plane"
             raise scene_error(scene.file, ("friction", number, "second_tangent"), fault)
         elif table.tangential_stiffness is not None:
-            fault = f"needs no tangential_stiffness: stop {table.stop} is rigid"
+            fault = f"is not for stop {table.stop}, which is rigid and has no spring along it"
             raise scene_error(scene.file, ("friction", number, "tangential_stiffness"), fault)
         stops[table.stop] = replace(stop, **rough)
     return tuple(stops)

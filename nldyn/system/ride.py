@@ -70,10 +70,10 @@ def carried_apart(
     return max(map(abs, apart.values()), default=0.0) > ALIKE * most
 
 
-def told_apart(table: str, number: int, at: str, against: str) -> str:
+def told_apart(what: str, at: str, against: str) -> str:
     """Why a spring, damper or stop between two places that a base carries otherwise is refused."""
     return (
-        f"{table}[{number}]: a base carries '{at}' otherwise than '{against}', but displacements "
+        f"{what}: a base carries '{at}' otherwise than '{against}', but displacements "
         "are relative to the base: move both by it, or give forces in place of it"
     )
 

@@ -974,7 +974,10 @@ class System:
                         for end in (at, against)
                     )
                     if carried_apart(bases, some, other):
-                        raise SystemModelError(told_apart(table, number, at, against))
+                        what = f"{table}[{number}]"
+                        if isinstance(element, Slider):
+                            what = f"friction at '{element.at}'"
+                        raise SystemModelError(told_apart(what, at, against))
 
     def with_slider(self, number: int, name: str, value: float) -> System:
         """The system with another number of one of its `sliders`.

@@ -3,11 +3,20 @@
 import numpy as np
 import pytest
 
-from nldyn import HarmonicForce, System, contact_area, continue_branch, solve_orbit
+from nldyn import (
+    HarmonicForce,
+    Parameter,
+    System,
+    contact_area,
+    continue_branch,
+    solve_orbit,
+)
+from nldyn.report.answer import answer_lines
 from nldyn.report.contact import contact_figure
 from nldyn.report.offline import unpacked
-from nldyn.report.results import write_results
+from nldyn.report.results import tables_of, write_results
 from nldyn.search.diagram import Diagram
+from nldyn.system import DryFriction
 
 
 def drawn(friction, gap):
@@ -45,3 +54,18 @@ def test_the_report_draws_it_once(tmp_path, monkeypatch):
     folder = write_results(diagram, tmp_path / "out")
     assert len(counted) == 1 and (folder / "contact.png").is_file()
     assert unpacked((folder / "report.html").read_text(encoding="utf-8"))["contact"]
+
+
+def test_along_a_parameter_its_title_and_the_answer_tell_the_value():
+    rough = [DryFriction(name, 1.0, 0.1) for name in ("a", "b")]
+    system = System.from_modal(
+        [1.0, 1.3], {"a": [1.0, 0.0], "b": [0.5, 1.0]}, modal_damping=0.1, dampers=rough,
+        excitation=[HarmonicForce("a", 30.0)],
+    )  # fmt: skip
+    limits, parameter = (0.1, 0.3), Parameter("friction", 1)
+    branch = continue_branch(solve_orbit(system, 0.7), limits, parameter=parameter)
+    diagram = Diagram((branch,), limits, "a", parameter=parameter)
+    figure = contact_figure(diagram)
+    assert figure.axes[0].get_title().endswith("at 0.7 Hz, friction of 'b' = 0.3")
+    lines = answer_lines(diagram, tables_of(diagram)["special_points"])
+    assert lines[0].endswith("at friction of 'b' = 0.1 (stable)")

@@ -91,7 +91,7 @@ def test_a_rigid_stop_has_friction_of_one_coefficient_without_a_spring(tmp_path)
     stop = build_system(scene_with(tmp_path, plain)).stops[1]
     assert stop.friction == Friction(0.3, base_speed=0.2)
     assert (stop.impulsive, stop.tangent) == (True, "along")
-    with pytest.raises(SceneError, match="needs no tangential_stiffness: stop 1 is rigid"):
+    with pytest.raises(SceneError, match="tangential_stiffness is not for stop 1, which is rigid"):
         build_system(scene_with(tmp_path, plain + "tangential_stiffness = 7.0\n"))
 
 

@@ -269,8 +269,8 @@ TIES = {
 @pytest.mark.parametrize("table", TIES)
 def test_what_ties_a_place_that_rides_to_one_that_does_not_is_refused(table):
     """Displacements are relative to the base: a base that moves both ends is no matter."""
-    name = {"friction": "sliders"}.get(table, table)  # as `System` calls them
-    with pytest.raises(SceneError, match=rf"{name}\[0\]: a base carries 'a' otherwise than 'b'"):
+    name = {"friction": "friction at 'a'"}.get(table, rf"{table}\[0\]")
+    with pytest.raises(SceneError, match=rf"{name}: a base carries 'a' otherwise than 'b'"):
         build_system(parse_scene(RIDES.format(load=[1.0, 0.0], element=TIES[table])))
     build_system(parse_scene(RIDES.format(load=[1.0, 1.0], element=TIES[table])))
     build_system(parse_scene(RIDES.format(load=[1.0, 0.0], element="")))
