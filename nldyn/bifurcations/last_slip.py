@@ -15,11 +15,13 @@ from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
 from nldyn.bifurcations.point import BranchNode
+from nldyn.flow.flow_map import Trajectory
+from nldyn.flow.sliding import held_in_pieces
 from nldyn.system.friction import Slider
 
 LEAST = 1e-6  # of the longest way of the walk: one that counts as the last, and
 LITTLE = 1e-3  # where a walk cannot go on
-STICKS = 0.5  # least share of the time
+STICKS = 0.5  # least share of the time in which it does
 SPREAD = 2.0  # factor between the ways by which the limit is found
 FARTHEST = 10.0  # times the way of the parameter between these
 
@@ -29,18 +31,23 @@ def last_slip(path: Sequence[BranchNode], least: float = LEAST) -> tuple[Slider,
 
     None if none slides so little, beside the most on the walk. One with a spring goes on.
     """
-    system = path[-1].orbit.system
-    for number, slider in enumerate(system.rubbing):
-        now = path[-1].orbit.friction[number]
-        if slider.tangential_stiffness is not None or now.stuck < STICKS:
+    orbit = path[-1].orbit
+    for number, slider in enumerate(orbit.system.sliders):
+        if slider.tangential_stiffness is not None or _stuck(orbit.trajectory, number) < STICKS:
             continue
         ways = np.array([node.orbit.friction[number].distance for node in path])
-        if now.distance > least * ways.max():
+        if ways[-1] > least * ways.max():
             continue
         limit = _limit(ways, np.array([node.value for node in path]))
         if limit is not None:
             return slider, limit
     return None
+
+
+def _stuck(motion: Trajectory, number: int) -> float:
+    """Share of the time in which a slider sticks, at less cost than all its measures."""
+    duration = motion.record.duration
+    return float(duration[held_in_pieces(motion, number)].sum() / duration.sum())
 
 
 def _limit(ways: Real, values: Real) -> float | None:
