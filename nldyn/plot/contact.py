@@ -26,7 +26,8 @@ from nldyn.system.naming import slider_name, stop_name
 PER = {"area": "/m²", "length": "/m", "node": ""}
 STRAIGHT = 1e-6  # of their extent: how far off a line points may lie
 ALIGNED = 1e-9  # 1 - cosine of the angle between a line and an axis of the mesh
-MOST_BARS, ROOM = 20, 4  # bars that are drawn at most; for how many there is room at least
+MOST_BARS, ROOM = 20, 2  # bars that are drawn at most; for how many there is room at least
+TWO_LINES = 6  # for how many bars at most names have room on two lines
 SECTORS, INSTANTS = 72, 7200  # of a circle, and of an excitation period
 
 
@@ -287,8 +288,13 @@ def _bars(orbit: Orbit, ax: Axes | None) -> Axes:
     drawn, left = names[:MOST_BARS], len(names[MOST_BARS:])
     factor, unit = unit_in("J", max(losses.values()))
     ax = ax if ax is not None else new_axes(9.0, 1.6 + 0.35 * len(drawn))
-    ax.barh(drawn, [losses[name] / factor for name in drawn], color=PERIOD_COLOURS[0], height=0.6)
-    ax.set_ylim(max(len(drawn), ROOM) - 0.5, -0.5)  # the largest on top
+    places, widths = range(len(drawn)), [losses[name] / factor for name in drawn]
+    ax.barh(places, widths, color=PERIOD_COLOURS[0], height=0.6)
+    then = ",\nstop at" if len(drawn) <= TWO_LINES else ", stop at"
+    labels = [name.replace(", stop at", then) for name in drawn]
+    ax.set_yticks(places, labels, parse_math=False)
+    middle, half = (len(drawn) - 1) / 2.0, max(len(drawn), ROOM) / 2.0
+    ax.set_ylim(middle + half, middle - half)  # the largest on top
     ax.set_xlabel(f"energy dissipated in a period ({unit})")
     ax.set_title(orbit_title(orbit) + (f", {left} more are smaller" if left else ""))
     return ax

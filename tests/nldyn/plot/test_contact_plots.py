@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from nldyn import HarmonicForce, RoundStop, System, SystemModelError, contact_area, solve_orbit
+from nldyn import (
+    HarmonicForce,
+    RoundStop,
+    Stop,
+    System,
+    SystemModelError,
+    contact_area,
+    solve_orbit,
+)
 from nldyn.plot import plot_friction_loss, plot_pressure, plot_wear_around
 from nldyn.system import DryFriction
 
@@ -81,6 +89,20 @@ def test_bars_are_what_each_loses_an_area_together(orbit):
     assert shown == pytest.approx(
         {"'pad', all points": first + second, "friction at 'c'": other}, rel=1e-12
     )
+
+
+@pytest.mark.parametrize(("count", "then"), [(2, ",\nstop"), (8, ", stop")])
+def test_few_bars_have_names_on_two_lines(count, then):
+    names = [f"t{number}" for number in range(count)]
+    rows = dict(zip([*names, "at"], np.eye(count + 1), strict=True))
+    system = System.from_modal(
+        np.linspace(1.0, 2.0, count + 1), rows, modal_damping=0.1,
+        stops=[Stop("at", 1.0, 1.0, 0.1, tangent=name, friction=0.1) for name in names],
+        excitation=[HarmonicForce("at", 10.0)],
+    )  # fmt: skip
+    ax = plot_friction_loss(solve_orbit(system, 0.7))
+    shown = {text.get_text() for text in ax.get_yticklabels()}
+    assert shown == {f"friction at '{name}'{then} at 'at'" for name in names}
 
 
 @pytest.mark.parametrize("rigid", [False, True])
