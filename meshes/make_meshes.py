@@ -209,6 +209,15 @@ def strip_mesh() -> fem.StructureMesh:
     return fem.frame_mesh({"root": (0.0, 0.0), "tip": (0.3, 0.0)}, [("strip", "root", "tip", 20)])
 
 
+def two_beams_mesh() -> fem.StructureMesh:
+    """Two cantilevers whose free ends overlap by 2 mm, 0.1 mm apart where they are 10 mm high."""
+    places = {"root_a": (0.0, 0.0), "tip_a": (0.3, 0.0), "root_b": (0.588, 0.0101)}
+    places |= {"half_b": (0.443, 0.0101), "tip_b": (0.298, 0.0101)}
+    lines = [("beam_a", "root_a", "tip_a", 16)]
+    lines += [("beam_b", "root_b", "half_b", 8), ("beam_b", "half_b", "tip_b", 8)]
+    return fem.frame_mesh(places, lines)
+
+
 def main() -> None:
     """Write all files."""
     dimensions = read_dimensions()
@@ -220,6 +229,7 @@ def main() -> None:
     fem.write_mesh(solid_half_beam_mesh(dimensions), HERE / "half_beam_solid.vtu")
     fem.write_mesh(tube_mesh(), HERE / "tube.msh")
     fem.write_mesh(strip_mesh(), HERE / "strip.msh")
+    fem.write_mesh(two_beams_mesh(), HERE / "two_beams.msh")
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ def folder(tmp_path_factory):
     """A folder of scenes with the meshes, and what else paths may lead to."""
     place = tmp_path_factory.mktemp("scenes")
     write_meshes(place)
-    for name in ("half_beam.msh", "tube.msh", "strip.msh", "portal.inp"):
+    for name in ("half_beam.msh", "tube.msh", "strip.msh", "two_beams.msh", "portal.inp"):
         (place / name).write_bytes(mesh(name).read_bytes())
     return place
 

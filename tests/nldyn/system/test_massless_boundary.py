@@ -27,6 +27,10 @@ from nldyn import (
     simulate,
     solve_orbit,
 )
+from nldyn.base.resources import example
+from nldyn.scene.build import build_system
+from nldyn.scene.component import build_component
+from nldyn.scene.read import load_scene
 from nldyn.system import DryFriction, Friction, rest
 from nldyn.system.equilibrium import closed_at_rest
 
@@ -171,17 +175,31 @@ def left(component, ends, modes):
     return b @ np.linalg.solve(K, b) - (basis.T @ b) @ inner
 
 
-def test_two_beams_come_back_as_integration_from_event_to_event_says(monkeypatch):
-    """The orbit of the gallery's page, with what is left of the flexibilities by dense algebra."""
+@pytest.fixture(params=["page", "scene"])
+def two_beams(request, monkeypatch):
+    """Two beams and their orbit at 100 Hz: of the gallery's page, or of the scene."""
+    if request.param == "scene":
+        scene = load_scene(example("two_beams.toml"))
+        return build_component(scene), solve_orbit(build_system(scene), 100.0), "_"
     monkeypatch.setattr(
         "matplotlib.pyplot.subplots", lambda *_, **__: (MagicMock(), [MagicMock()] * 2)
     )
     page = runpy.run_path(str(ROOT / "docs/gallery/two_beams.py"))
-    beams, orbit, system = page["beams"], page["orbit"], page["near"]
-    rows = system.participation
+    return page["beams"], page["orbit"], " "
+
+
+def test_two_beams_come_back_as_integration_from_event_to_event_says(two_beams):
+    """With what is left of the flexibilities by dense algebra, and beams as in closed form."""
+    beams, orbit, gap = two_beams
+    system = orbit.system
+    rows = {name.replace(gap, " "): row for name, row in system.participation.items()}
     w, omega = system.natural_frequencies, 200.0 * math.pi
+    lengths, heights = np.array([0.3, 0.29, 0.3, 0.29]), np.array([0.01, 0.01, 0.014, 0.014])
+    known = 1.875104069**2 * math.sqrt(2.1e11 / 7800.0 / 12.0) * heights / lengths**2
+    assert w[:4] == pytest.approx(known, rel=1e-5)
     across, along = (rows[f"tip a {axis}"] - rows[f"tip b {axis}"] for axis in "yz")
-    give = [left(beams, [f"tip a {axis}", f"tip b {axis}"], 8) for axis in "yz"]
+    ends = [[f"tip{gap}{name}{gap}{axis}" for name in "ab"] for axis in "yz"]
+    give = [left(beams, pair, 8) for pair in ends]
     load = 2.0 * rows["half b y"] + 20.0 * rows["half b z"]
     body = Body(
         np.eye(w.size), np.diag(0.02 * w), np.diag(w**2), lambda t: load * np.cos(omega * t),
