@@ -106,6 +106,8 @@ def contact_measures(
 ) -> ContactMeasures:
     """Peak and r.m.s. contact force, impulse and impacts per second, and impact power.
 
+    Impacts on a rigid stop count by impulse, work and loss; of forces there are only those of rest.
+
     Parameters
     ----------
     source : Orbit, Motion or Attractor
@@ -146,7 +148,9 @@ def contact_measures(
     motion, name, stable = _motion_on(source, periods)
     table = panel_table(motion, stop)
     listed = impacts(source if isinstance(source, Orbit) else motion)
-    speeds = listed.speed[listed.stop == stop]
+    own = listed.stop == stop
+    speeds = listed.speed[own]
+    at_once = own & np.isnan(listed.peak_force)  # on a rigid stop, in no time
     time = motion.duration
     lengths = zip(np.diff(motion.begins), motion.stretches, strict=True)
     turns = float(sum(length * stretch.omega for length, stretch in lengths)) / (2.0 * math.pi)
@@ -158,10 +162,10 @@ def contact_measures(
         system.unit(system.stops[stop].at) == "rad",
         float(table.peak_force.max(initial=0.0)),
         math.sqrt(max(float(table.square.sum()), 0.0) / time),
-        float(table.impulse.sum()) / time,
+        float(table.impulse.sum() + listed.impulse[at_once].sum()) / time,
         speeds.size / time,
-        float(table.work.sum()) / time,
-        float(table.loss.sum()) / time,
+        float(table.work.sum() + listed.work[at_once].sum()) / time,
+        float(table.loss.sum() + listed.loss[at_once].sum()) / time,
         float(table.duration.sum()) / time,
         float(speeds.max(initial=0.0)),
     )

@@ -411,6 +411,18 @@ def test_mean_contact_force_balances_the_spring(one_dof):
         assert found.peak_force == pytest.approx(5.17e9 * depth**1.5, rel=1e-5)
 
 
+def test_impulses_on_a_rigid_stop_balance_the_spring_and_their_losses_the_excitation():
+    orbit = solve_orbit(make_one_dof(stops=[RigidStop("middle", 0.7)]), 25.3)
+    found, h = contact_measures(orbit), orbit.history(100000)
+    assert found.impulse_rate == pytest.approx(-16877.0 * harmonics(orbit).phasor[0].real, rel=1e-5)
+    speed, omega = h.modal_velocity[:-1, 0] / math.sqrt(2.48), orbit.omega
+    push = 4.92e-6 * omega**2 * np.cos(omega * h.time[:-1])
+    damping = 2.0 * 0.0142 * math.sqrt(16877.0 * 2.48)
+    taken = np.mean(push * speed) - np.mean(damping * speed**2)
+    assert found.loss_power == pytest.approx(taken, rel=1e-3)
+    assert found.impact_power == pytest.approx(found.loss_power / (1.0 - 0.7**2), rel=1e-9)
+
+
 def test_rms_force_agrees_with_a_fine_history(one_dof):
     orbit = solve_orbit(one_dof, 25.3)
     force = orbit.history(200000).force[:-1, 0]
