@@ -47,6 +47,7 @@ AREA_SAMPLES = 1000  # of a forcing period
 SAME_PHASE = 1e-9  # in rad: an extreme and an impact
 LIFTS_OFF = 1e-5  # rad behind rest, where a flight that grows with their cube is rounding
 SAME = 1e-5  # distance of orbits that are one, relative to their size
+STEADY = 1e-9  # share of a depth by which it swings, where that is rounding
 REPEATS = 1e-6  # the same of an orbit from itself some periods later
 LARGEST_EXPONENT = 700.0  # of a finite exponential
 LOST = 1e-6  # rounding of a determinant's logarithm, above which it tells nothing
@@ -554,6 +555,7 @@ class Orbit:
     def impact_list(self) -> tuple[Impact, ...]:
         """Contact peaks in the order of time (a double-peaked contact counts twice here).
 
+        What is pressed alike all the time, as what goes in a circle in its ring, counts once.
         Of impacts with a rigid stop that end in rest the first counts.
         """
         found = []
@@ -578,8 +580,10 @@ class Orbit:
 
     def _elastic_list(self, index: int) -> list[Impact]:
         """Contact peaks at a stop that gives way."""
-        peaks = self.penetration_peaks[index]
-        pairs = zip(peaks.phases.tolist(), peaks.values.tolist(), strict=True)
+        peaks, depths = self.penetration_peaks[index], self.extremes(index).values
+        pairs = list(zip(peaks.phases.tolist(), peaks.values.tolist(), strict=True))
+        if depths.size and np.ptp(depths) <= STEADY * depths.min():  # but for rounding
+            pairs = pairs[:1]
         return [
             Impact(index, phase / self.omega, depth, self._largest_force(index, phase, depth))
             for phase, depth in pairs

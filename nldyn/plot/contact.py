@@ -29,6 +29,7 @@ ALIGNED = 1e-9  # 1 - cosine of the angle between a line and an axis of the mesh
 MOST_BARS, ROOM = 20, 2  # bars that are drawn at most; for how many there is room at least
 TWO_LINES = 6  # for how many bars at most names have room on two lines
 SECTORS, INSTANTS = 72, 7200  # of a circle, and of an excitation period
+ROLLS = 1e-9  # share of its speed at which what goes round does not slide, but for rounding
 
 
 def plot_pressure(
@@ -179,7 +180,9 @@ def plot_wear_around(orbit: Orbit, stop: int, ax: Axes | None = None) -> Axes:
     phases = 2.0 * np.pi * orbit.period * np.arange(count) / count
     states = orbit.states(phases)
     at, pressed = system.round_polar(ring, states), orbit.history_at(phases, states).force[:, stop]
-    lost = ring.friction * pressed * np.abs(at.sliding) * orbit.duration / count
+    slides = np.abs(at.sliding)
+    slides[slides <= ROLLS * np.abs(at.sliding - ring.sliding_speed)] = 0.0
+    lost = ring.friction * pressed * slides * orbit.duration / count
     normals = at.normal
     if ring.impulsive:
         hits = rigid_impacts(orbit.trajectory, stop)

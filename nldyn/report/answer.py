@@ -93,7 +93,7 @@ def _contact_lines(nodes: Sequence[BranchNode], along: Along) -> list[str]:
     stops = nodes[0].orbit.system.stops
     if not stops:
         return ["largest contact force: there are no stops"]
-    if not any(node.orbit.impacts for node in nodes):
+    if not any(node.orbit.impacts or node.orbit.max_penetration for node in nodes):
         return ["largest contact force: none, no stop is touched"]
     kinds: dict[tuple[bool, bool], list[int]] = {}
     for number, stop in enumerate(stops):

@@ -39,13 +39,16 @@ def contact_figure(diagram: Diagram, scene: Scene | None = None) -> Figure | Non
     Returns
     -------
     matplotlib.figure.Figure or None
-        None where there are neither areas nor friction, or nothing is touched and nothing slides.
+        None where nothing slides and no area is touched.
     """
     nodes = [node for branch in diagram.branches for node in branch.nodes]
     system = nodes[0].orbit.system if nodes else None
     if system is None or not (system.areas or system.rubbing):
         return None
-    size = _lost if any(_lost(node.orbit) for node in nodes) else _pressed
+    slides = any(_lost(node.orbit) for node in nodes)
+    if not (slides or system.areas):
+        return None
+    size = _lost if slides else _pressed
     node = max(nodes, key=lambda node: size(node.orbit))
     if size(node.orbit) == 0.0:
         return None

@@ -91,6 +91,18 @@ def test_forces_and_impulses_are_told_apart_where_stops_are_of_both_kinds():
     assert told.startswith(f"{max(rigid):.4g} N s") if rigid else "no such stop" in told
 
 
+def test_a_stop_that_never_opens_is_told_with_its_force():
+    """Under a preload of 0.1 mm the mass swings on both springs."""
+    found = diagram(oscillator(stops=[Stop.linear("middle", 5e3, gap=-1e-4)]), (10.0, 11.0), [1])
+    (branch,) = found.branches
+    assert not any(orbit.impacts for orbit in branch.points)
+    value, unit, *_ = lines_of(found)[1].split(": ")[1].split()
+    pressed = float(value) * {"N": 1.0, "mN": 1e-3}[unit]
+    held = 5e3 * 1e-4 * STIFFNESS / (STIFFNESS + 5e3)  # what it bears at rest
+    swings = branch.points[-1].max_abs_displacement + 1e-4
+    assert held < pressed < 5e3 * swings
+
+
 def test_stops_that_no_orbit_touches_are_told_in_one_line():
     """Also where they are of several kinds."""
     stops = [Stop.linear("middle", 5e3, gap=1.0), RigidStop("middle", 0.6, gap=1.0, direction=-1)]
