@@ -22,10 +22,12 @@ OF_LISTS = {  # the keys of each list of tables that may change
     "excitation": SOURCES,
     "dampers": ("coefficient",),
     "friction": ("coefficient", "normal_force", "tangential_stiffness", "base_speed"),
-    "round_clearances": (*SHARED, "restitution", "clearance", "friction", "eccentricity"),
+    "round_clearances": (
+        *SHARED, "restitution", "clearance", "friction", "surface_speed", "eccentricity",
+    ),
     "contact_areas": ("gap", "stiffness", "friction"),
     "springs": ("stiffness", "coefficients"),
-}
+}  # fmt: skip
 SHORT = {
     **{name: f"stops.0.{name}" for name in OF_STOPS},
     "damping": "damping.modal_ratio",

@@ -31,6 +31,7 @@ from nldyn.system.parameters import (
     Parameter,
     check_exact,
     check_index,
+    check_round,
 )
 from nldyn.system.springs_dampers import PolynomialSpring
 from nldyn.system.stop import LARGEST_EXPONENT
@@ -41,10 +42,10 @@ SPIN, SPEED = "spin_hz", "speed_hz"  # of a shaft; the same with the excitation,
 EVERY_MODE = -1
 
 _OF_DAMPERS = ("coefficient",)
-BASE_SPEED = "base_speed"  # of a slider
+BASE_SPEED, SURFACE_SPEED = "base_speed", "surface_speed"  # of a slider, a round clearance
 _OF_SPRINGS = {"spring_stiffness": "stiffness"}  # and what it is called there
 _OF_MODES = ("modal_damping", "natural_frequency_hz")
-OF_ELEMENTS = (*EXACT, BASE_SPEED, *_OF_DAMPERS, *_OF_SPRINGS)
+OF_ELEMENTS = (*EXACT, BASE_SPEED, SURFACE_SPEED, *_OF_DAMPERS, *_OF_SPRINGS)
 UNITS = {
     "frequency_hz": "Hz",
     SPIN: "Hz",
@@ -69,6 +70,7 @@ UNITS = {
     "normal_force": "N",
     "tangential_stiffness": "N/m",
     BASE_SPEED: "m/s",
+    SURFACE_SPEED: "m/s",
     "coefficient": "N s/m",
     "spring_stiffness": "N/m",
     "modal_damping": "1",
@@ -174,9 +176,9 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
     parameter : str or Parameter
         An `OwnParameter`, or frequency_hz; gap, stiffness, exponent, dissipation, dashpot or
         restitution of a stop; amplitude, mass_times_radius or force of an excitation; friction or
-        normal_force of a slider, or base_speed of what it slides on; area_gap, area_stiffness or
-        area_friction of an area of contact; coefficient of a damper; spring_stiffness of a linear
-        spring; k1, k2, ... of a polynomial one;
+        normal_force of a slider, or base_speed of what it slides on; surface_speed of a round
+        clearance; area_gap, area_stiffness or area_friction of an area of contact; coefficient of a
+        damper; spring_stiffness of a linear spring; k1, k2, ... of a polynomial one;
         modal_damping (ratio) or natural_frequency_hz of a mode; spin_hz of a system with a `Spin`,
         or speed_hz, which is spin and frequency in one where they are equal. The index -1 of
         modal_damping means all modes, which then have one ratio.
@@ -198,6 +200,8 @@ def checked_parameter(system: System, parameter: str | Parameter) -> Parameter:
         check_exact(system, parameter)
     elif parameter.name == BASE_SPEED:
         check_index(parameter, "slider", len(system.sliders))
+    elif parameter.name == SURFACE_SPEED:
+        check_round(system, parameter, turns=True)
     elif parameter.name in _OF_DAMPERS:
         check_index(parameter, "damper", len(system.dampers))
         if isinstance(system.dampers[parameter.index], DryFriction):
@@ -348,7 +352,7 @@ def value_of(system: System, frequency_hz: float, parameter: Parameter) -> float
         return system.sliders[index].friction.base_speeds[0]
     if name == "friction":
         return system.sliders[index].friction.coefficient
-    if name in OF_ROUND:
+    if name in OF_ROUND or name == SURFACE_SPEED:
         return system.round_stops[index].number(name)
     return float(getattr(elements_of(system, name)[index], _OF_SPRINGS.get(name, name)))
 
@@ -390,7 +394,7 @@ def with_value(system: System, parameter: Parameter, value: float) -> System:
         return system.with_elements(stops=_replaced(system.stops, index, name, value))
     if name in OF_AREAS:
         return system.with_area(index, OF_AREAS[name], value)
-    if name in OF_ROUND:
+    if name in OF_ROUND or name == SURFACE_SPEED:
         other = system.round_stops[index].with_number(name, value)
         stops = (*system.stops[:index], other, *system.stops[index + 1 :])
         return system.with_elements(stops=stops)

@@ -126,13 +126,7 @@ def check_exact(system: System, parameter: Parameter) -> None:
                 "the stiffness of each is in series with what gives way at once"
             )
     elif name in OF_ROUND:
-        check_index(parameter, "stop", len(system.stops))
-        if index not in system.round_stops:
-            raise SystemModelError(f"parameter '{name}': stops[{index}] is no round clearance")
-        if name == "rubbing_friction" and system.round_stops[index].surface_speed is None:
-            raise SystemModelError(
-                f"parameter '{name}': stops[{index}] has no surface_speed, which friction needs"
-            )
+        check_round(system, parameter, turns=name == "rubbing_friction")
     elif name in SOURCES:
         check_index(parameter, "excitation", len(system.excitation))
         if not hasattr(system.excitation[index], name):
@@ -159,6 +153,18 @@ def check_exact(system: System, parameter: Parameter) -> None:
             )
     else:
         raise SystemModelError(f"unknown parameter '{name}'; there are: {', '.join(EXACT)}")
+
+
+def check_round(system: System, parameter: Parameter, *, turns: bool) -> None:
+    """Refuse the number of a stop that is no round clearance, or has no speed of its surface."""
+    name, index = parameter.name, parameter.index
+    check_index(parameter, "stop", len(system.stops))
+    if index not in system.round_stops:
+        raise SystemModelError(f"parameter '{name}': stops[{index}] is no round clearance")
+    if turns and system.round_stops[index].surface_speed is None:
+        raise SystemModelError(
+            f"parameter '{name}': stops[{index}] has no surface_speed, which friction needs"
+        )
 
 
 def check_index(parameter: Parameter, kind: str, count: int) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,7 @@ from nldyn.system.contact_law import ContactLaw
 from nldyn.system.stop import Stop
 from nldyn.system.values import check_finite, check_not_negative, check_positive
 
+_CALLED = {"rubbing_friction": "friction"}  # here
 _CENTRES = ("first_eccentricity", "second_eccentricity")
 _NUMBERS = ("stiffness", "clearance", "exponent", "dissipation", "friction")
 _OF_ELASTIC = {"exponent": 1.5, "dissipation": 0.0, "law": None}  # and what a rigid one leaves them
@@ -324,16 +325,15 @@ class RoundStop:
         """
         if name in _CENTRES:
             return self.eccentricity[_CENTRES.index(name)]
-        return self.friction if name == "rubbing_friction" else self.clearance
+        return float(getattr(self, _CALLED.get(name, name)))
 
     def with_number(self, name: str, value: float) -> RoundStop:
         """The same with another value of one of them."""
         if name in _CENTRES:
             x, y = self.eccentricity
             return replace(self, eccentricity=(value, y) if name == _CENTRES[0] else (x, value))
-        if name == "rubbing_friction":
-            return replace(self, friction=value)
-        return replace(self, clearance=value)
+        change: dict[str, Any] = {_CALLED.get(name, name): value}
+        return replace(self, **change)
 
     def force(self, penetration: ArrayLike, speed: ArrayLike = 0.0) -> Real:
         """Normal force in N at penetrations (m) and their rates (m/s)."""

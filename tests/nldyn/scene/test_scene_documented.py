@@ -158,7 +158,7 @@ def test_scene_in_the_document_is_good():
 def test_example_is_good_and_explains_its_tables(name):
     scene = load_scene(example(name))
     assert scene.title and scene.continuation
-    assert scene.excitation or scene.friction
+    assert scene.excitation or scene.friction or scene.round_clearances
     lines = scene.text.splitlines()
     for number, line in enumerate(lines):
         if re.match(r"\[+(?!modal\.|parts\.leaf|observe|mesh)", line):

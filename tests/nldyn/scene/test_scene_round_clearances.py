@@ -81,6 +81,7 @@ def test_one_may_be_rigid(tmp_path):
     ("key", "parameter"),
     [
         ("clearance", Parameter("clearance", 0)),
+        ("surface_speed", Parameter("surface_speed", 0)),
         ("friction", Parameter("rubbing_friction", 0)),
         ("eccentricity.1", Parameter("second_eccentricity", 0)),
         ("stiffness", Parameter("stiffness", 0)),

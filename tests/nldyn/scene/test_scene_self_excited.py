@@ -13,7 +13,11 @@ from nldyn import SystemModelError, diagram, explore, load, solve_orbit
 from nldyn.app.cli import main
 from nldyn.base.errors import ConvergenceError, SceneError
 from nldyn.base.resources import example
+from nldyn.plot import plot_wear_around
+from nldyn.report.answer import answer_lines
+from nldyn.report.contact import contact_figure
 from nldyn.report.render import orbit_to_draw
+from nldyn.report.results import tables_of
 from nldyn.scene.build import build_system
 from nldyn.scene.checks import check_computable
 from nldyn.scene.read import load_scene, parse_scene
@@ -131,6 +135,31 @@ def test_the_limit_cycle_of_the_scene_itself_is_drawn_and_has_its_closed_form():
     assert orbit_to_draw(scene, build_system(scene), None).duration == pytest.approx(
         closed_form(0.1), rel=1e-9
     )
+
+
+def rolling(speed):
+    """Radius in m of the rotor that rolls in its ring: m v²/r = k r + s (r - c)."""
+    m, k, s, c = 10.0, 4e5, 2e6, 6e-4
+    return (s * c + math.sqrt((s * c) ** 2 + 4.0 * (s + k) * m * speed**2)) / (2.0 * (s + k))
+
+
+def test_the_rotor_of_the_example_whips_backwards_as_in_closed_form():
+    """It rolls, so that its frequency is v/r; its ring is pressed alike all the time."""
+    found = compute(load_scene(example("dry_whip.toml")))
+    (branch,) = found.branches
+    assert (branch.values.min(), branch.values.max()) == (0.18, 0.35)
+    radii = np.array([rolling(speed) for speed in branch.values])
+    np.testing.assert_allclose(branch.frequency_hz, branch.values / radii / 2 / math.pi, rtol=1e-10)
+    for orbit, radius in zip(branch.points, radii, strict=True):
+        (pressed,) = orbit.impact_list
+        assert pressed.force == pytest.approx(2e6 * (radius - 6e-4), rel=1e-9)
+        x, y = (orbit.history(4).displacement[name][:2] for name in "xy")
+        assert x[0] * y[1] - x[1] * y[0] == pytest.approx(-(radius**2), rel=1e-9)  # from y to x
+    force = f"{2e6 * (radii.max() - 6e-4):.4g} N at surface speed 0.35 m/s (stable)"
+    told = answer_lines(found, tables_of(found)["special_points"])
+    assert f"largest contact force: {force}" in told
+    assert not plot_wear_around(branch.points[0], 0).patches[0].get_data().values.any()
+    assert contact_figure(found) is None
 
 
 @pytest.mark.parametrize(
