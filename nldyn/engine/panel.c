@@ -15,7 +15,7 @@
 #define LARGEST_ANGLE 1e5 /* that `fill_sines` is left to */
 #define ALONG 1e-9   /* of the cosine squared: a slider that moves as a stop does */
 #define ROUGH 3       /* steps in which the turning of friction over a plane is not led by forces */
-#define LEAVING 4      /* rounds of the guess of how what is let go over a plane leaves */
+#define LEAVING 6      /* rounds of the guess of how what is let go over a plane leaves */
 #define STALE 0.1     /* rate from which its matrix is inverted anew */
 
 static bool is_many(const Flow *fl, const Panel *panel);
@@ -304,6 +304,18 @@ static void with_forces(const Panel *panel, const double *free, const double *fo
             width);
 }
 
+/* fill the force that presses what slides on, by the penetrations of its stop, and its derivatives */
+static void press_again(const Flow *fl, Panel *panel, int a, double *slope)
+{
+    int na = panel->na, m = panel->m, s = panel->active[a];
+    if (!is_pressed(fl, s)) return;
+    int normal = place_of(panel, (int)stop_of(fl, s)->normal);
+    double *speed = panel->output + (size_t)(na + normal) * m;
+    closed_laws(fl, panel->active[normal], m, panel->output + (size_t)normal * m, speed,
+                panel->F + (size_t)normal * m, slope + (size_t)normal * m,
+                slope + (size_t)(na + normal) * m);
+}
+
 /* fill the rates of the outputs with what the guessed penetrations lead to without them */
 static void guess_rates(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel,
                         Scratch *s)
@@ -315,8 +327,9 @@ static void guess_rates(const Flow *fl, const Gauss *tab, int kind, double h, Pa
     for (int a = 0; a < panel->na; a++) {
         if (!is_let_go(fl, panel->active[a]) || is_mate(fl, panel->active[a])) continue;
         for (int round = 0; round < LEAVING; round++) {
+            press_again(fl, panel, a, s->new_slope);
             guess_leaving(fl, tab, kind, h, panel, a);
-            with_forces(panel, s->free, panel->F, width, panel->output);
+            with_forces(panel, s->free, panel->F, 0, panel->output);
         }
     }
 }

@@ -101,6 +101,27 @@ def test_more_random_systems_agree(seed, kind):
     agrees(seed, kind)
 
 
+def test_what_is_let_go_where_its_stop_lets_go_soon_leaves_in_one_panel():
+    """Its friction falls with the force of the stop, which must be known before it can leave."""
+    M, size, omega = np.diag([1.0, 2.0, 1.5]), np.array([2.0, 1.0, 0.5]), 0.6 * math.pi
+    K = np.array([[3.0, -1.0, 0.0], [-1.0, 3.0, -0.5], [0.0, -0.5, 2.0]])
+    C, unit, law = 0.05 * K + 0.02 * M, np.eye(3), Friction(0.3, base_speed=(0.05, -0.025))
+    system = System.from_matrices(
+        M, K, dict(zip("xyz", unit, strict=True)), damping=C,
+        stops=[Stop("x", 60.0, 1.0, 0.3, friction=law, tangent="y", second_tangent="z")],
+        excitation=[HarmonicForce(name, force) for name, force in zip("xyz", size, strict=True)],
+    )  # fmt: skip
+    body = Body(M, C, K, lambda t: size * np.cos(omega * t), unit[1:], 0.3, normal=unit[0],
+                spring=60.0, gap=0.3, base_speed=law.base_speeds)  # fmt: skip
+    flow, phases = FlowMap(system), 4.0 * TURN
+    motion = flow.trajectory(flow.to_state(np.zeros(6))[None], phases, omega)
+    expected = body.followed(np.zeros(6), phases[1] / omega)
+    assert "slip" in body.met
+    ends = flow.to_start(motion.states(phases[1:])[0]).reshape(2, -1) @ bases(system).T
+    np.testing.assert_allclose(ends.ravel(), expected, atol=1e-9 * np.abs(expected).max())
+    assert motion.record.used < 40
+
+
 @pytest.mark.parametrize("friction", [0.1, 0.2, 0.4])
 def test_along_one_tangent_it_is_friction_along_a_line(friction):
     """It turns where it comes to rest, stays and is let go; across, nothing is left of a speed."""
