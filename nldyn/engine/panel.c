@@ -15,6 +15,7 @@
 #define LARGEST_ANGLE 1e5 /* that `fill_sines` is left to */
 #define ALONG 1e-9   /* of the cosine squared: a slider that moves as a stop does */
 #define ROUGH 3       /* steps in which the turning of friction over a plane is not led by forces */
+#define MOST_TURNS 12  /* steps in which what slides over a plane settles: else it goes to and fro */
 #define LEAVING 6      /* rounds of the guess of how what is let go over a plane leaves */
 #define STALE 0.1     /* rate from which its matrix is inverted anew */
 
@@ -457,7 +458,8 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
     if (panel->outputs > panel->na) guess_rates(fl, tab, kind, h, panel, s);
     bool discs = any_disc(fl, panel);
     double before = INFINITY;
-    for (int iteration = 0; iteration < 60; iteration++) {
+    int most = discs ? MOST_TURNS : 60;
+    for (int iteration = 0; iteration < most; iteration++) {
         if (iteration % 8 == 7 && interrupted(fl->watch)) break; /* a step of 40 stops takes long */
         panel->rough = discs && iteration < ROUGH;
         if (discs && iteration <= ROUGH) panel->kept = false;
