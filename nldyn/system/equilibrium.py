@@ -437,39 +437,49 @@ def _at_round(system: System, stop: RoundStop, q: Real) -> tuple[Polar, Real]:
     return system.round_polar(stop, at_rest(q)[None]), np.array(system.stop_vectors(stop))
 
 
-def _rubbed(system: System, q: Real) -> tuple[Real, Real]:
-    """Friction (n,) of the closed round clearances of what turns, and its derivative (n, n).
+class Rubbed(NamedTuple):
+    """What the forces leave over at rest with friction, and the slopes of that.
 
-    What does not turn may rest with any friction up to μN: it is taken to rest without.
+    The normal forces N of the round clearances are unknowns beside the displacements q: what gives
+    way little, or not at all, keeps Newton's method else to steps as short as its penetration.
+
+    Parameters
+    ----------
+    forces : (n,)
+        What the forces leave over.
+    misses : (r,)
+        Penetrations, less those that belong to N; zero of what is open.
+    slopes : (n + r, n + r)
+        Derivatives of both by q and N.
+    size : float
+        Sum of the sizes of all forces.
     """
-    force, slope = np.zeros(system.size), np.zeros((system.size, system.size))
-    for _, stop, c, depth, *_ in _closed(system.elastic_stops, system, q):
-        if not isinstance(stop, RoundStop) or not stop.friction or not stop.surface_speed:
-            continue
-        at, rows = _at_round(system, stop, q)
-        normal, across = at.normal[0] @ rows, at.across[0] @ rows
-        pressed, stiffness = _elastic(stop, depth)
-        force += stop.rub * pressed * across
-        turned = -stop.rub * pressed / float(at.radius[0]) * normal
-        slope += stop.rub * stiffness * np.outer(across, c) + np.outer(turned, across)
-    return force, slope
+
+    forces: Real
+    misses: Real
+    slopes: Real
+    size: float
 
 
 def _with_friction(system: System, q: Real) -> Real:
     """Where it rests with the friction of round clearances, from where it would without.
+
+    What does not turn may rest with any friction up to μN: it is taken to rest without.
 
     Raises
     ------
     SystemModelError
         If it does not: friction carries it round.
     """
-    push = constant_force(system)
-    rubs = any(stop.friction for stop in system.round_stops.values())
-    if not (rubs and np.any(_rubbed(system, q)[0])):
+    rounds = system.round_stops
+    pressed = _pressed(system, q, np.zeros(len(rounds)))
+    rubs = [stop.friction > 0.0 and stop.sliding_speed != 0.0 for stop in rounds.values()]
+    if not np.any(pressed[rubs]):
         return q
+    others = _without_rounds(system)
     for share in np.linspace(0.0, 1.0, RISES + 1)[1:]:
-        q = _carried_on(system, push, q, share)
-        if _left_over(system, push, q, share) > BALANCED * _sum_of_forces(system, push, q):
+        q, pressed, left = _carried_on(system, others, q, pressed, share)
+        if left > BALANCED:
             raise SystemModelError(
                 "under constant forces and the friction of a round clearance it comes to no rest "
                 "that Newton's method finds"
@@ -477,27 +487,79 @@ def _with_friction(system: System, q: Real) -> Real:
     return q
 
 
-def _carried_on(system: System, push: Real, q: Real, share: float) -> Real:
-    """Where Newton's method, its steps shortened, comes from q with a share of the friction."""
+def _pressed(system: System, q: Real, pressed: Real) -> Real:
+    """Normal forces (r,) of the round clearances: where none is known, that of the penetration."""
+    own = [
+        _elastic(stop, max(float(_at_round(system, stop, q)[0].depth[0]), 0.0))[0]
+        for stop in system.round_stops.values()
+    ]
+    return np.where(pressed > 0.0, pressed, own)
+
+
+def _without_rounds(system: System) -> System:
+    """The system with its round clearances out of reach."""
+    stops = [s.out_of_reach(FARTHEST) if isinstance(s, RoundStop) else s for s in system.stops]
+    return system.with_elements(stops=tuple(stops))
+
+
+def _rubbed(system: System, others: System, q: Real, pressed: Real, share: float) -> Rubbed:
+    """The forces at q with normal forces (r,) of round clearances and a share of their friction."""
+    push, n = constant_force(system), q.size
+    forces, misses = force_at(others, push, q), np.zeros(pressed.size)
+    slopes = np.zeros((n + pressed.size, n + pressed.size))
+    slopes[:n, :n] = tangent_stiffness(others, q)
+    size = _sum_of_forces(others, push, q)
+    for i, (stop, force) in enumerate(zip(system.round_stops.values(), pressed, strict=True), n):
+        if force == 0.0:
+            slopes[i, i] = 1.0
+            continue
+        at, rows = _at_round(system, stop, q)
+        normal, across = at.normal[0] @ rows, at.across[0] @ rows
+        rub = share * stop.rub if stop.sliding_speed else 0.0
+        c = stop.sense * normal
+        forces += force * (c + rub * across)
+        size += force * float(np.linalg.norm(c))
+        bent = stop.sense * across - rub * normal
+        slopes[:n, :n] += force / float(at.radius[0]) * np.outer(bent, across)
+        slopes[:n, i], slopes[i, :n] = c + rub * across, c
+        depth = (force / stop.stiffness) ** (1.0 / stop.exponent)
+        slopes[i, i] = -depth / (stop.exponent * force)
+        misses[i - n] = float(at.depth[0]) - depth
+    return Rubbed(forces, misses, slopes, size)
+
+
+def _carried_on(
+    system: System, others: System, q: Real, pressed: Real, share: float
+) -> tuple[Real, Real, float]:
+    """Where Newton's method comes from q with a share of the friction, and what is left over."""
+    n, now = q.size, _rubbed(system, others, q, pressed, share)
+    left = _left_over(system, now)
     for _ in range(MOST_STEPS):
-        friction, slope = _rubbed(system, q)
-        stiffness = tangent_stiffness(system, q) + share * slope
-        wrong = force_at(system, push, q) + share * friction
-        step = np.linalg.lstsq(stiffness, -wrong, rcond=None)[0]
-        left, size = float(np.linalg.norm(wrong)), 1.0
-        while size > SHORT and _left_over(system, push, q + size * step, share) >= left:
+        scale = np.ones(n + pressed.size)  # of N, with which its slopes are as those of q
+        scale[n:] = np.abs(now.slopes[:n, :n]).max() or 1.0
+        scale[n:] /= np.abs(now.slopes[n:]).max(axis=1)
+        wrong = scale * np.append(now.forces, now.misses)
+        step = scale * np.linalg.lstsq(scale[:, None] * now.slopes * scale, -wrong, rcond=None)[0]
+        size = 1.0
+        while size > SHORT:
+            there = q + size * step[:n]
+            forces = _pressed(system, there, pressed + size * step[n:])
+            then = _rubbed(system, others, there, forces, share)
+            if _left_over(system, then) < left:
+                break
             size *= 0.5
-        if size <= SHORT:
-            return q
-        q = q + size * step
-        if np.linalg.norm(step) <= SHORT * np.linalg.norm(q):
-            return q
-    return q
+        else:
+            break
+        q, pressed, now, left = there, forces, then, _left_over(system, then)
+        if np.linalg.norm(step[:n]) <= SHORT * np.linalg.norm(q):
+            break
+    return q, pressed, left
 
 
-def _left_over(system: System, push: Real, q: Real, share: float) -> float:
-    """Size of what the forces at q leave over, with a share of the friction."""
-    return float(np.linalg.norm(force_at(system, push, q) + share * _rubbed(system, q)[0]))
+def _left_over(system: System, found: Rubbed) -> float:
+    """Share of the forces that is left over, and of the clearances by which penetrations miss."""
+    rooms = [stop.clearance for stop in system.round_stops.values()]
+    return float(np.linalg.norm([*found.forces / found.size, *found.misses / rooms]))
 
 
 def _elastic(stop: Stop | RoundStop, depth: float) -> tuple[float, float]:

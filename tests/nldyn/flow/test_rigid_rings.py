@@ -557,6 +557,73 @@ def test_it_holds_a_weight_at_rest():
     assert describe_stop(ring) == "rigid ring around 'x', 'y': restitution 0.5, clearance 0.001 m"
 
 
+def pressed(stop, weight, *others):
+    """1 kg on 1 N/m both ways, under a weight along x."""
+    return System.from_matrices(
+        np.eye(2), np.eye(2), PLANE, damping=0.2 * np.eye(2), stops=[stop],
+        excitation=[ConstantForce("x", weight), *others],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("mu", "surface", "weight", "centre", "inside"),
+    [
+        (0.3, 1.0, 1.5, (0.0, 0.0), True),
+        (0.05, 1.0, 3.0, (0.0, 0.0), True),
+        (0.3, -1.0, 10.0, (0.0, 0.0), True),
+        (0.3, 1.0, 3.0, (0.2, -0.4), True),
+        (0.3, 1.0, 2.0, (1.5, 0.3), False),
+        (0.2, -1.0, 2.0, (1.5, 0.3), False),
+    ],
+)
+def test_a_rotor_that_turns_rests_where_friction_and_spring_hold_it(
+    restitution, mu, surface, weight, centre, inside
+):
+    """It rolls up to the angle at which the forces along the circle vanish."""
+    ring = RoundStop.rigid(
+        ("x", "y"), restitution, 1.0, eccentricity=centre, inside=inside, friction=mu,
+        surface_speed=surface,
+    )  # fmt: skip
+    system = pressed(ring, weight)
+    place = rest(system)
+    found = system.round_polar(ring, np.append(place, [0.0, 0.0])[None])
+    radius = found.radius[0]
+    assert radius == pytest.approx(1.0, abs=1e-7)  # by a stiff spring in its place
+
+    def forces(angle):
+        """Force that presses it to the other side, and what is left along the circle."""
+        normal = np.array([math.cos(angle), math.sin(angle)])
+        acting = np.array([weight, 0.0]) - centre - radius * normal
+        press = ring.sense * float(acting @ normal)
+        along = float(acting @ [-normal[1], normal[0]])
+        return press, along - math.copysign(mu, ring.sense * surface) * press
+
+    angle = math.atan2(*found.normal[0][::-1])
+    true = brentq(lambda a: forces(a)[1], angle - 0.3, angle + 0.3, xtol=1e-14)
+    assert angle == pytest.approx(true, abs=1e-10)
+    assert forces(true)[0] > 0.0
+
+
+def test_a_rotor_that_slides_on_a_ring_swings_about_where_it_rests():
+    """A small force F cos ωt along x moves it by the angle a: with the weight W, N = W cos φ - k c,
+    m c a'' + d c a' + W (cos φ - μ sin φ) a = -F (sin φ + μ cos φ) cos ωt about φ."""
+    mu, weight, push, w = 0.3, 1.5, 1e-5, 2.0 * math.pi * 0.2
+    ring = RoundStop.rigid(("x", "y"), 0.5, 1.0, friction=mu, surface_speed=1.0)
+    system = pressed(ring, weight, HarmonicForce("x", push))
+    orbit = solve_orbit(system, 0.2, seconds=20.0)
+    place = brentq(
+        lambda a: -weight * math.sin(a) - mu * (weight * math.cos(a) - 1.0), -0.5, 0.0, xtol=1e-15
+    )
+    s, c = math.sin(place), math.cos(place)
+    swing = -push * (s + mu * c) / (weight * (c - mu * s) - w * w + 0.2j * w)
+    phases = np.linspace(0.0, 2.0 * np.pi, 9)
+    x, y = orbit.states(phases)[:, :2].T
+    assert np.hypot(x, y) == pytest.approx(np.ones(9), abs=1e-10)
+    angles = np.arctan2(y, x) - place
+    assert angles == pytest.approx((swing * np.exp(1j * phases)).real, abs=1e-4 * abs(swing))
+
+
 @pytest.mark.parametrize(("angle", "at_once"), [(2.4, False), (2.9, True)])
 def test_a_force_that_friction_makes_endless_is_told(angle, at_once):
     """With masses m along both directions and 0.9 m between them the normal n and the way t of the
