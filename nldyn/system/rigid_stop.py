@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.system.contact_law import ContactLaw, numba_for
-from nldyn.system.friction import Friction
+from nldyn.system.friction import Friction, check_plane
 from nldyn.system.round_stop import RoundStop
 from nldyn.system.stop import Stop, check_tangent
 from nldyn.system.values import check_sides
@@ -110,6 +110,8 @@ class RigidStop:
         check_sides(owner, self.at, self.against, self.direction)
         ends = (self.tangent, self.tangent_against)
         law = check_tangent(owner, (self.at, self.against), ends, self.friction)
+        if law is not None:
+            check_plane(owner, ends, None, law)
         object.__setattr__(self, "friction", law)
 
     @property

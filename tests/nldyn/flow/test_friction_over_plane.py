@@ -11,6 +11,7 @@ from nldyn import (
     FlowMap,
     HarmonicForce,
     Parameter,
+    RigidStop,
     Stop,
     System,
     SystemModelError,
@@ -321,6 +322,10 @@ def test_friction_of_zero_over_a_plane_changes_nothing():
         (lambda: table(damper=DryFriction("x", 1.0, 0.3, None, 5.0, "w")), "unknown interface 'w'"),
         (
             lambda: DryFriction("x", 1.0, Friction(0.3, base_speed=(0.1, 0.2)), None, 5.0),
+            "base_speed of two needs a second_tangent",
+        ),
+        (
+            lambda: RigidStop("x", 0.5, tangent="y", friction=Friction(0.3, base_speed=(0.1, 0.2))),
             "base_speed of two needs a second_tangent",
         ),
         (lambda: Friction(0.3, base_speed=(0.1, 0.2, 0.3)), "along each of two tangents, got 3"),
