@@ -634,7 +634,7 @@ def scales(point: Real, tangent: Real) -> bool:
 
 def _resonance_beside(orbit: Orbit) -> float | None:
     """Frequency in Hz of an undamped mode at which a motion without contact grows, or None."""
-    if orbit.impacts or orbit.max_penetration > 0.0:
+    if orbit.touches_stops:
         return None
     return orbit.system.response(orbit.omega).resonance_hz(orbit.omega, BESIDE_RESONANCE)
 

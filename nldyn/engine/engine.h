@@ -30,8 +30,8 @@ enum Status {
 #define WORST_ROUNDING 1e-6
 #define MOST_STEPS 10000000 /* in the search for one contact: a second */
 #define MOST_PIECES 20000   /* flights and panels in one segment */
-/* what a stop damps: a panel shows decay by e^-8 to 14 digits, and nothing is left of e^-40 */
 #define LET_GO 2 /* in place of 1 in fl->slides: over a plane from rest on, without a spring */
+/* what a stop damps: a panel shows decay by e^-8 to 14 digits, and nothing is left of e^-40 */
 #define DECAY 8.0
 #define FADED 40.0
 /* below this exponent a slope sets in almost at once: there nodes at the switch count, and less

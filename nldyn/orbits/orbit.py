@@ -504,6 +504,11 @@ class Orbit:
         """
         return max(self._penetrations.values(), default=0.0)
 
+    @cached_property
+    def touches_stops(self) -> bool:
+        """Whether a stop is touched: hit, pressed, or rested on."""
+        return bool(self.impacts or self.max_penetration > 0.0 or self.rests)
+
     def deepest_penetration(self, unit: str) -> float:
         """Deepest penetration over the stops of which it has this unit, m or rad."""
         system, depths = self.system, self._penetrations

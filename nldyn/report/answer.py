@@ -93,7 +93,7 @@ def _contact_lines(nodes: Sequence[BranchNode], along: Along) -> list[str]:
     stops = nodes[0].orbit.system.stops
     if not stops:
         return ["largest contact force: there are no stops"]
-    if not any(node.orbit.impacts or node.orbit.max_penetration for node in nodes):
+    if not any(node.orbit.touches_stops for node in nodes):
         return ["largest contact force: none, no stop is touched"]
     kinds: dict[tuple[bool, bool], list[int]] = {}
     for number, stop in enumerate(stops):
@@ -127,7 +127,9 @@ def _contact_line(
         (True, True): "largest angular impulse of an impact",
     }[rigid, angle]
     if not any(hits.values()):
-        return f"{name}: none, no {'such ' * (len(among) < len(stops))}stop is touched"
+        rests = rigid and any(node.orbit.rests for node in nodes)
+        such = "such " * (len(among) < len(stops))
+        return f"{name}: none" + (", but of rest" if rests else f", no {such}stop is touched")
     return f"{name}: " + _of_stable_and_all(nodes, lambda o: _hardness(hits[id(o)]), told)
 
 

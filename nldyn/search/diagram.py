@@ -493,7 +493,7 @@ def _searched(
 
     def told(done: int, found: Found) -> None:
         box.outlook.searched(part, [box.at(value).frequency_hz for value in values], done)
-        if part == SEARCH and any(map(_touches, chain(*found[1].values()))):
+        if part == SEARCH and any(each.touches_stops for each in chain(*found[1].values())):
             box.outlook.touched()
         box.done = box.outlook.done
         for period, orbits in found[1].items():
@@ -575,12 +575,7 @@ def shortened(
 def _contact_is_missing(box: Collector) -> bool:
     """Whether all stops are open at rest, and no orbit found touches one."""
     orbits = (orbit for branch in box.branches for orbit in branch.points)
-    return reach(box.flow.system) > 0.0 and not any(map(_touches, orbits))
-
-
-def _touches(orbit: Orbit) -> bool:
-    """Whether an orbit touches a stop."""
-    return orbit.impacts > 0 or orbit.max_penetration > 0.0
+    return reach(box.flow.system) > 0.0 and not any(orbit.touches_stops for orbit in orbits)
 
 
 def _follow_seeds(

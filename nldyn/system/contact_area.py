@@ -114,10 +114,11 @@ def contact_area(
     if not np.all(shares > 0.0):
         raise SystemModelError(f"{owner}: weights must be positive, got {shares.min():g}")
     if stiffness == math.inf:
-        given = (dissipation, dashpot, tangential_stiffness, second_tangents)
-        if exponent != 1.0 or any(given):
+        given = (tangential_stiffness, second_tangents, second_tangents_against)
+        bare = not (dissipation or dashpot) and all(each is None for each in given)
+        if exponent != 1.0 or not pulls or not bare:
             raise SystemModelError(
-                f"{owner}: rigid contact has no exponent, dissipation, dashpot, tangential "
+                f"{owner}: rigid contact has no exponent, dissipation, dashpot, pulls, tangential "
                 "stiffness nor second tangents"
             )
         along, beside = others[1:3]

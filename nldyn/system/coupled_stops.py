@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nldyn.base.arrays import Real
+from nldyn.base.errors import SystemModelError
 
 Flags = NDArray[np.bool_]
 PIVOTS_PER_STOP = 100  # in the search for the closed ones, at most
@@ -76,8 +77,9 @@ class CoupledStops:
     def maps(self, depths: Real) -> Real:
         """What maps y to δ, (k, n, n), at penetrations y (k, n) of the modes."""
         known: dict[bytes, Real] = {}
-        found, closed = [], np.zeros(len(self.common), dtype=bool)
+        found = []
         for y in depths:
+            closed = np.zeros(y.size, dtype=bool)
             for _ in range(PIVOTS_PER_STOP * y.size):
                 key = closed.tobytes()
                 if key not in known:
@@ -86,6 +88,11 @@ class CoupledStops:
                 if not wrong.any():
                     break
                 closed[int(np.argmax(wrong))] ^= True  # the first one: so it ends
+            else:
+                raise SystemModelError(
+                    "which stops without mass are closed is not found: they have too much of "
+                    "their flexibility in common"
+                )
             found.append(known[key])
         return np.array(found).reshape(len(depths), *self.common.shape)
 

@@ -251,7 +251,8 @@ class RoundClearanceTable(Table):
 
 
 ONLY_ELASTIC = (
-    *("stiffness", "dissipation", "dashpot", "pulls", "tangential_stiffness", "second_along"),
+    *("stiffness", "dissipation", "dashpot", "pulls", "tangential_stiffness"),
+    *("second_along", "second_along_against"),
 )
 
 

@@ -50,8 +50,8 @@ class ReductionTable(Table):
     """`"rubin"`, `"craig-bampton"`, `"guyan"` (takes none of these three), `"macneal"` (needs
     `massless`) or `"truncation"`; see [cms.md](cms.md)."""
     massless: list[str] = []
-    """Interfaces where stops alone act, whose points carry no mass:
-    [rigid contact without mass](../how-to/massless_boundary.md)."""
+    """Interfaces, or areas of contact for all of their points, where stops alone act; they carry no
+    mass: [rigid contact without mass](../how-to/massless_boundary.md)."""
 
     @model_validator(mode="after")
     def _one_choice(self) -> ReductionTable:

@@ -262,6 +262,7 @@ def test_a_rub_all_around_is_that_in_closed_form(friction, surface):
     assert moved.force[:, 0] == pytest.approx(rub.force, rel=1e-10)
     assert orbit.states(np.zeros(1))[0] == pytest.approx(rub.start, rel=1e-9, abs=1e-14)
     assert (orbit.impacts, orbit.rests, orbit.max_penetration) == (0, True, 0.0)
+    assert orbit.touches_stops
     known = np.concatenate([[0.0, 0.0], np.exp(rub.rates * 2.0 * np.pi / rub.w)])
     gap = np.sort_complex(orbit.multipliers) - np.sort_complex(known)
     assert np.abs(gap).max() < 1e-10

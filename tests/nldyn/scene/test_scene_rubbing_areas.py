@@ -326,7 +326,6 @@ def test_a_rigid_stop_between_components_without_mass_gives_way_by_what_both_hav
             "'second_along' must be perpendicular to 'along'",
         ),
         ('friction = 0.3\nalong = "x"\n', "", "'tangential_stiffness', which needs 'friction'"),
-        ("tangential_stiffness = 1e7", 'second_along = "z"', "and a 'tangential_stiffness'"),
         ("tangential_stiffness = 1e7", "tangential_stiffness = 0", "greater than 0"),
         ("friction = 0.3", "friction = -0.3", "must be at least 0"),
     ],

@@ -117,6 +117,8 @@ def test_rigid_areas_with_mass_and_a_stiffness_in_series_are_refused(strip):
         System.from_reduced(cms.reduce(component, modes=8), stops=stops)
     with pytest.raises(SystemModelError, match="rigid contact has no exponent"):
         contact_area("bed", names, math.inf, exponent=1.5)
+    with pytest.raises(SystemModelError, match="dashpot, pulls"):
+        contact_area("bed", names, math.inf, pulls=False)
     system = landing(strip, 4, 1e4)
     with pytest.raises(SystemModelError, match="in series with what gives way at once"):
         check_exact(system, Parameter("area_stiffness"))
