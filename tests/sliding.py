@@ -319,3 +319,15 @@ def off_differences(flow, found, z, phases, omega, step):
     exact = [*found.jacobians[0].T, omega * found.d_omega[0]]
     off = [slope(*way) - column for way, column in zip(directions, exact, strict=True)]
     return np.abs(off).max() / max(np.abs(exact).max(), 1.0)
+
+
+def monodromy(orbit):
+    """By differences of a period's end."""
+    flow, node = orbit.problem.flow, orbit.problem.nodes(orbit.point)[0]
+    turn = np.array([0.0, 2.0 * np.pi])
+    columns = [
+        (flow.shoot((node + step)[None], turn, orbit.omega).ends[0]
+         - flow.shoot((node - step)[None], turn, orbit.omega).ends[0]) / 2e-6
+        for step in 1e-6 * np.eye(node.size)
+    ]  # fmt: skip
+    return np.array(columns).T

@@ -70,11 +70,10 @@ def _pace(orbit: Orbit, number: int, phases: Real, share: float) -> Real:
 
 def _slips(orbit: Orbit, number: int, phases: Real) -> Real:
     """Speeds of a slider on what it slides on, at ascending phases."""
-    motion, base = orbit.trajectory, orbit.system.sliders[number].friction.base_speeds[0]
+    motion = orbit.trajectory
     begin, end = motion.span
     within = (phases - begin) % (end - begin) + begin
     order = np.argsort(within, kind="stable")
-    row = motion.flow.rate_rows[len(orbit.system.stops) + number]
     found = np.empty(len(phases))
-    found[order] = motion.states(within[order]) @ row - base
+    found[order] = motion.flow.slips(number, motion.states(within[order]))[:, 0]
     return found

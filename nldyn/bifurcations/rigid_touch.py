@@ -166,7 +166,7 @@ class Touches:
             if number is None:
                 continue
             row, friction = len(flow.system.stops) + number, flow.system.sliders[number].friction
-            way = np.sign(flow.rate_rows[row] @ state - friction.base_speeds[0])
+            way = np.sign(flow.slips(number, state[None])[0, 0])
             kick += way * friction.coefficient * flow.force_columns[:, row]
         if self.at.change is not None:
             kicks = kicks @ self.at.change[1].T

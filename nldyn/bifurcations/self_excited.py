@@ -130,9 +130,7 @@ def _slips(orbit: Orbit, which: int, states: Real) -> Real:
     flow, system = orbit.trajectory.flow, orbit.system
     slider = system.rubbing[which]
     if which < len(system.sliders):
-        rows = flow.plane_rows.get(which, [len(system.stops) + which])[:2]
-        slips = states @ flow.rate_rows[rows].T - slider.friction.base_speeds[: len(rows)]
-        return np.asarray(np.linalg.norm(slips, axis=1))
+        return np.asarray(np.linalg.norm(flow.slips(which, states), axis=1))
     at = system.round_polar(system.round_stops[slider.stop], flow.to_modal(states))
     return np.where(at.depth > 0.0, np.abs(at.sliding), np.nan)
 

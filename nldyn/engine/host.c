@@ -104,7 +104,7 @@ EXPORT int64_t nldyn_runs_v3(void) { return 0; }
 #endif
 
 /* what the callers must know alike: how many columns a stop has, and the last outcome */
-EXPORT int64_t nldyn_layout(void) 
+EXPORT int64_t nldyn_layout(void)
 {
     return 10000 * (int64_t)(sizeof(System) / 8) + 100 * FIRST_POWER + UNDECIDED;
 }

@@ -405,6 +405,14 @@ class FlowMap:
         """Rows of the outputs' velocities in flight."""
         return self.system.linear.times_block(self.rows)
 
+    def slips(self, number: int, states: Real) -> Real:
+        """Speeds (k, 1), over a plane (k, 2), of a slider on what it slides on, at states z."""
+        slider = self.system.sliders[number]
+        rows = self.plane_rows.get(number, [len(self.system.stops) + number])[: len(slider.ends)]
+        return np.asarray(
+            states @ self.rate_rows[rows].T - slider.friction.base_speeds[: len(rows)]
+        )
+
     def response(self, omega: float) -> ForcedResponse:
         """Response of the linear part at ω (rad/s), see `System.response`."""
         return self.system.response(omega, self.clock)

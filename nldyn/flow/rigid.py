@@ -194,7 +194,7 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
             most = slider.friction.coefficient * normal
             pulled = np.clip(slider.tangential_stiffness * (states @ flow.rows[i]), -most, most)
         else:
-            speed = states @ flow.rate_rows[i] - slider.friction.base_speeds[0]
+            speed = flow.slips(i - first, states)[:, 0]
             law = np.sign(friction.sum(axis=1)) * slider.friction.at(speed)
             pulled = np.where(sticks, 0.0, law) * normal
         rates -= pulled[:, None] * flow.force_columns[:, i]

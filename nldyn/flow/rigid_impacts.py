@@ -47,8 +47,7 @@ def course(flow: FlowMap, stop: int, states: Real) -> Course:
     rows = [stop, stop]
     if number is not None:
         rows[1] = len(flow.system.stops) + number
-        belt = flow.system.sliders[number].friction.base_speeds[0]
-        slip = states @ flow.rate_rows[rows[1]] - belt
+        slip = flow.slips(number, states)[:, 0]
     mobility = np.broadcast_to(flow.mobility(rows), (len(states), 2, 2))
     return Course(depth, closing, slip, np.asarray(mobility))
 

@@ -22,7 +22,8 @@ class CoupledStops:
 
     With the penetrations y of the modes, :math:`\delta = y - N F` with the forces F = k δ of the
     stops where δ > 0, and none elsewhere: a linear complementarity problem with one solution, as
-    N + diag(1/k) is positive definite. So long as the same stops are closed, δ is linear in y.
+    N + diag(1/k) is positive definite between stops that may be closed at once. So long as the
+    same stops are closed, δ is linear in y.
 
     Parameters
     ----------

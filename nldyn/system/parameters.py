@@ -120,7 +120,7 @@ def check_exact(system: System, parameter: Parameter) -> None:
                 "stiffness"
             )
         each = [stop.stiffness / stop.share for stop in points]
-        together = any(system.coupled.involves(system.stops.index(stop)) for stop in points)
+        together = any(map(system.coupled.involves, list(system.areas.values())[index]))
         if name == "area_stiffness" and (together or max(each) - min(each) > SLACK * max(each)):
             raise SystemModelError(
                 f"parameter '{name}': the points of area '{points[0].area}' have no mass, so that "

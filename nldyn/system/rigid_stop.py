@@ -12,7 +12,7 @@ from nldyn.system.contact_law import ContactLaw, numba_for
 from nldyn.system.friction import Friction, check_plane
 from nldyn.system.round_stop import RoundStop
 from nldyn.system.stop import Stop, check_tangent
-from nldyn.system.values import check_sides
+from nldyn.system.values import check_restitution, check_sides
 
 Restitution = Callable[[float], tuple[float, float]]
 TRIED_SPEEDS = tuple(10.0**k for k in range(-12, 4))  # m/s
@@ -98,10 +98,8 @@ class RigidStop:
         if callable(self.restitution):
             for speed in TRIED_SPEEDS:
                 _check_restitution(owner, self.restitution, speed)
-        elif not (is_finite(self.restitution) and 0.0 <= self.restitution <= 1.0):
-            raise SystemModelError(
-                f"{owner}: restitution must lie between 0 and 1, got {shown(self.restitution)}"
-            )
+        else:
+            check_restitution(owner, self.restitution)
         if not (is_finite(self.gap) and self.gap >= 0.0):
             raise SystemModelError(
                 f"{owner}: gap must not be negative, got {shown(self.gap)}: a preload needs a "

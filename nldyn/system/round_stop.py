@@ -11,10 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nldyn.base.arrays import Real
-from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
+from nldyn.base.errors import SystemModelError, check_types, shown
 from nldyn.system.contact_law import ContactLaw
 from nldyn.system.stop import Stop
-from nldyn.system.values import check_finite, check_not_negative, check_positive
+from nldyn.system.values import (
+    check_finite,
+    check_not_negative,
+    check_positive,
+    check_restitution,
+)
 
 _CALLED = {"rubbing_friction": "friction"}  # here
 _CENTRES = ("first_eccentricity", "second_eccentricity")
@@ -162,10 +167,7 @@ class RoundStop:
             object.__setattr__(self, name, float(getattr(self, name)))
 
     def _check_rigid(self, owner: str) -> None:
-        if not (is_finite(self.restitution) and 0.0 <= (self.restitution or 0.0) <= 1.0):
-            raise SystemModelError(
-                f"{owner}: restitution must lie between 0 and 1, got {shown(self.restitution)}"
-            )
+        check_restitution(owner, self.restitution)
         given = [name for name, none in _OF_ELASTIC.items() if getattr(self, name) != none]
         if self.stiffness != math.inf or given:
             name = given[0] if given else "stiffness"

@@ -30,6 +30,12 @@ def check_not_negative(owner: str, name: str, value: float) -> None:
         raise SystemModelError(f"{owner}: {name} must not be negative, got {value:g}")
 
 
+def check_restitution(owner: str, value: float | None) -> None:
+    """Refuse what is no coefficient of restitution."""
+    if value is None or not (is_finite(value) and 0.0 <= value <= 1.0):
+        raise SystemModelError(f"{owner}: restitution must lie between 0 and 1, got {shown(value)}")
+
+
 def check_ends(kind: str, at: object, against: object) -> None:
     """Refuse what names no interface, and one interface at both ends of an element."""
     check_types(**{f"{kind}: at": (at, str), f"{kind}: against": (against, str, None)})

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from hard_plane import Body
-from sliding import off_differences
+from sliding import monodromy, off_differences
 
 from nldyn import (
     FlowMap,
@@ -160,13 +160,7 @@ def resting(friction=0.45, spring=None):
 
 def test_an_orbit_that_rests_its_multipliers_and_balance():
     orbit = solve_orbit(resting(), SLOW / (2.0 * math.pi))
-    flow, node = orbit.problem.flow, orbit.problem.nodes(orbit.point)[0]
-    columns = [
-        (flow.shoot((node + step)[None], TURN, orbit.omega).ends[0]
-         - flow.shoot((node - step)[None], TURN, orbit.omega).ends[0]) / 2e-6
-        for step in 1e-6 * np.eye(node.size)
-    ]  # fmt: skip
-    largest = np.sort(np.abs(np.linalg.eigvals(np.array(columns).T)))[::-1]
+    largest = np.sort(np.abs(np.linalg.eigvals(monodromy(orbit))))[::-1]
     np.testing.assert_allclose(np.abs(orbit.multipliers), largest, atol=1e-6)
     (found,) = orbit.friction
     assert min(found.stuck, found.slid) > 0.2 and found.stuck + found.slid == pytest.approx(1.0)

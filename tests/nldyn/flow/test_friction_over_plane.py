@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from plane_sliding import Body, Disc
-from sliding import off_differences
+from sliding import monodromy, off_differences
 
 from nldyn import (
     FlowMap,
@@ -220,18 +220,6 @@ def test_derivatives_by_numbers_are_those_of_differences(name, index):
     ]
     slope = (ends[0] - ends[1])[0] / (2e-6 * value)
     np.testing.assert_allclose(exact, slope, atol=1e-6 * np.abs(exact).max())
-
-
-def monodromy(orbit):
-    """By differences of a period's end."""
-    flow, node = orbit.problem.flow, orbit.problem.nodes(orbit.point)[0]
-    turn = np.array([0.0, 2.0 * math.pi])
-    columns = [
-        (flow.shoot((node + step)[None], turn, orbit.omega).ends[0]
-         - flow.shoot((node - step)[None], turn, orbit.omega).ends[0]) / 2e-6
-        for step in 1e-6 * np.eye(node.size)
-    ]  # fmt: skip
-    return np.array(columns).T
 
 
 def test_orbits_multipliers_and_balances():
