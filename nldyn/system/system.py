@@ -48,6 +48,7 @@ AnyDamper = Damper | CubicDamper | DryFriction
 LARGEST_PARTICIPATION = 1e50  # its square is the mobility of a stop, and its fourth power occurs
 NEGATIVE = 1e-10  # of a stiffness with a unit diagonal: an eigenvalue that is not rounding
 NOT_HELD = "the structure is free to move in a way that no stop limits, and nothing tells its place"
+_SIDES = ("at", "against", "direction")  # of a stop: its vector tells them
 MOST_SIDES = 1024  # of stops to both sides, which are tried together
 PARALLEL = 1e-12  # sine of the angle between modal vectors that are one motion
 FEW = 8.0  # roundings of each mode in the largest ω²
@@ -584,7 +585,7 @@ class System:
         All excitation must change its sign after half its period T: it has odd harmonics only.
         """
         stops = [
-            (self.stop_vector(s), replace(s, at="", direction=1, against=None))
+            (self.stop_vector(s), [getattr(s, f.name) for f in fields(s) if f.name not in _SIDES])
             for s in self.stops
             if not isinstance(s, RoundStop)
         ]

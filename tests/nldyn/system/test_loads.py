@@ -297,6 +297,20 @@ def test_even_harmonics_break_the_symmetry_of_opposed_stops():
         assert not make("held", stops=stops, excitation=[*odd, source]).symmetric
 
 
+def test_opposed_stops_between_two_bodies_that_slide_are_symmetric():
+    vectors = dict(zip("abcd", np.eye(4), strict=True))
+    both = [
+        Stop("a", 10.0, gap=1e-3, direction=d, against="b", tangent="c", friction=0.3,
+             tangent_against="d")
+        for d in (1, -1)
+    ]  # fmt: skip
+    for stops, same in ((both, True), (both[:1], False)):
+        system = System.from_matrices(
+            np.eye(4), np.eye(4), vectors, stops=stops, excitation=[HarmonicForce("a", 1.0)]
+        )
+        assert system.symmetric is same
+
+
 @pytest.mark.parametrize(
     ("name", "hz"),
     [
