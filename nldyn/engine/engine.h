@@ -51,7 +51,7 @@ enum Status {
 #define MAPPED 0.75 /* share of a panel's length for a map that brings nodes together at an end */
 
 /* What the program that called gives: how other threads of it run meanwhile, whether it was
- * interrupted, and BLAS; each may be missing. */
+ * interrupted, BLAS, and whether it has had enough; each may be missing. */
 typedef void Dgemm(const char *, const char *, const int *, const int *, const int *,
                    const double *, const double *, const int *, const double *, const int *,
                    const double *, double *, const int *);
@@ -60,6 +60,8 @@ typedef struct {
     void (*acquire)(void *);
     int (*signalled)(void);
     Dgemm *dgemm;
+    int (*enough)(void);
+    double pause; /* s between two looks whether it was interrupted, or has had enough */
 } Host;
 
 /* one call's link to it */

@@ -5,7 +5,6 @@
 #include <cpuid.h>
 #endif
 
-#define PAUSE 0.05 /* s between two looks whether Ctrl-C was pressed */
 #define WORTH 4096 /* multiplications from which a product of matrices is left to BLAS */
 
 static double seconds_now(void)
@@ -20,7 +19,7 @@ static void begin_watch(Watch *watch, const Host *host)
 {
     watch->host = host;
     watch->stopped = false;
-    watch->next = seconds_now() + PAUSE;
+    watch->next = seconds_now() + watch->host->pause;
     watch->thread = host->release ? host->release() : NULL;
 }
 
@@ -36,8 +35,9 @@ static bool interrupted(Watch *watch)
     if (seconds_now() < watch->next) return false;
     end_watch(watch);
     watch->stopped = watch->host->signalled() != 0;
+    if (!watch->stopped && watch->host->enough) watch->stopped = watch->host->enough() != 0;
     watch->thread = watch->host->release ? watch->host->release() : NULL;
-    watch->next = seconds_now() + PAUSE;
+    watch->next = seconds_now() + watch->host->pause;
     return watch->stopped;
 }
 

@@ -25,6 +25,7 @@ FOLDER = Path(os.environ.get("NLDYN_ENGINE", Path(__file__).parent)).resolve()  
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 REBUILT = "'pip install .' or '-e .' builds it"
 NOT_BUILT = f"the engine of nldyn is not built: {REBUILT}"
+PAUSE = 0.05  # s between two looks whether Ctrl-C was pressed, or a caller has had enough
 LAYOUT = 10000 * SYSTEM_FIELDS + 100 * FIRST_POWER + UNDECIDED  # as `nldyn_layout` of the engine
 
 
@@ -93,13 +94,19 @@ def _function(name: str) -> int:
     return int(ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value or 0)
 
 
+def host(enough: int = 0) -> bytes:
+    """The structure Host, with the address of a function that tells whether a call is to end."""
+    return Packed(*_GIVEN, enough, PAUSE).content
+
+
 LIBRARY = _load()
-HOST = Packed(
+_GIVEN = (
     _function("PyEval_SaveThread"),
     _function("PyEval_RestoreThread"),
     _function("PyErr_CheckSignals"),
     _capsule("dgemm"),
-).content
+)
+HOST = host()
 
 
 def function(name: str, *arguments: Any, result: Any = ctypes.c_int64) -> Any:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from nldyn.base.arrays import Complex, Real
 from nldyn.engine.layout import OUT_OF_MEMORY, Record, SystemData
-from nldyn.engine.library import HOST, Packed, function
+from nldyn.engine.library import Packed, function
+from nldyn.engine.looking import host_now, raise_ended
 from nldyn.engine.numbers import address_of, reals
 
 WIDTH = 8  # numbers in the widest register
@@ -161,7 +162,8 @@ def newton(
         address_of(like.block) if like is not None else 0,
         *[first_place + start for start in starts],
     )  # fmt: skip
-    outcome = _newton(HOST, system.content, tables.content, record.packed, task)
+    outcome = _newton(host_now(), system.content, tables.content, record.packed, task)
+    raise_ended()
     if outcome == OUT_OF_MEMORY:
         raise MemoryError("no memory for a motion with so many modes and stops")
     told, along, ends, jacobians, d_omegas, by, closings = [numbers[part] for part in parts]

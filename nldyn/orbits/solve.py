@@ -117,7 +117,8 @@ def solve_orbit(
     pieces = (segments or period) // period  # of one excitation period
     limit = TimeLimit(seconds, frequency_hz, progress)
     try:
-        return _searched(problem, omega, observe, pieces, limit)
+        with limit.held():
+            return _searched(problem, omega, observe, pieces, limit)
     except OutOfTimeError as error:
         raise ConvergenceError(
             f"no orbit of period {period} found at {frequency_hz:g} Hz within {seconds:g} s, spent "

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
+from nldyn.engine.looking import looking
 from nldyn.runtime.progress import Progress, silent
 
 
@@ -12,7 +15,7 @@ class OutOfTimeError(RuntimeError):
 
 
 class TimeLimit:
-    """The processor time that a search may take.
+    """The processor time that a search may take, to within 0.05 s and what Python does at a stretch.
 
     Parameters
     ----------
@@ -38,6 +41,7 @@ class TimeLimit:
         self.tell = progress or silent
         self._start = time.thread_time()
         self._looked = 0.0  # time spent at the last look
+        self._what = "its start"  # what the search was at then
 
     def __repr__(self) -> str:
         return f"<TimeLimit: {self.spent:.3g} of {self.seconds:g} s spent>"
@@ -58,5 +62,21 @@ class TimeLimit:
         spent = self.spent
         if 2.0 * spent - self._looked > self.seconds:
             raise OutOfTimeError(what)
-        self._looked = spent
+        self._looked, self._what = spent, what
         self.tell(what, self.frequency_hz, max(spent, 0.0) / self.seconds)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let the time bound the block also where it lasts long between two looks.
+
+        Raises
+        ------
+        OutOfTimeError
+            From a call of the flow map in which the time is spent.
+        """
+        with looking(self._check):
+            yield
+
+    def _check(self) -> None:
+        if self.spent > self.seconds:
+            raise OutOfTimeError(self._what)
