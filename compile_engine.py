@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import platform
+import runpy
 import shlex
 import shutil
 import subprocess
@@ -21,6 +22,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent
 ENGINE = ROOT / "nldyn" / "engine"
+FINGERPRINT = runpy.run_path(str(ENGINE / "fingerprint.py"))["fingerprint"](ENGINE)
 FLAGS = [
     "-std=c11", "-O3", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-math-errno",
     "-fno-trapping-math", "-ffp-contract=off",
@@ -94,7 +96,8 @@ def compile_engine(folder: Path = ENGINE, flags: Sequence[str] = ()) -> list[Pat
     for level, more in (LEVELS_OF_ZIG if "ziglang" in command else LEVELS).items():
         if x86 or not level:
             library = folder / f"engine{level}{suffix(tag)}"
-            _compile([*command, *FLAGS, *more, *flags], library)
+            of_sources = f"-DFINGERPRINT={FINGERPRINT}"
+            _compile([*command, *FLAGS, of_sources, *more, *flags], library)
             libraries.append(library)
     print(f"nldyn: the engine is built by '{shlex.join(command)}'", file=sys.stderr)
     return libraries

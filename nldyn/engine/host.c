@@ -109,6 +109,12 @@ EXPORT int64_t nldyn_layout(void)
     return 10000 * (int64_t)(sizeof(System) / 8) + 100 * FIRST_POWER + UNDECIDED;
 }
 
+/* the sources of the library, see fingerprint.py */
+#ifndef FINGERPRINT
+#define FINGERPRINT 0
+#endif
+EXPORT int64_t nldyn_fingerprint(void) { return FINGERPRINT; }
+
 /* the compiler of the library, as "clang 21.1" */
 #define QUOTED(text) #text
 #define VERSION(name, major, minor) name " " QUOTED(major) "." QUOTED(minor)

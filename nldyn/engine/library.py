@@ -18,10 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cython_blas
 
+from nldyn.engine.fingerprint import fingerprint
 from nldyn.engine.layout import FIRST_POWER, SYSTEM_FIELDS, UNDECIDED
 from nldyn.engine.numbers import address_of
 
-FOLDER = Path(os.environ.get("NLDYN_ENGINE", Path(__file__).parent)).resolve()  # of sanitizers
+SOURCES = Path(__file__).resolve().parent  # without C files in what a wheel installs
+FOLDER = Path(os.environ.get("NLDYN_ENGINE", SOURCES)).resolve()  # of sanitizers
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 REBUILT = "'pip install .' or '-e .' builds it"
 NOT_BUILT = f"the engine of nldyn is not built: {REBUILT}"
@@ -34,14 +36,25 @@ def library_name(level: str = "") -> str:
     return f"engine{level}{SUFFIX}"
 
 
+def _fits(library: ctypes.PyDLL, sources: int | None) -> bool:
+    """Whether a library has the layout, and the fingerprint of the C files where they lie here."""
+    if not hasattr(library, "nldyn_fingerprint") or library.nldyn_layout() != LAYOUT:
+        return False
+    library.nldyn_fingerprint.restype = ctypes.c_int64
+    return sources in (None, library.nldyn_fingerprint())
+
+
 def _load() -> ctypes.PyDLL:
     """The library's best form for this processor; $NLDYN_PROCESSOR=baseline asks for the first."""
     base = FOLDER / library_name()
     if not base.exists():
         raise ImportError(f"{NOT_BUILT} (no {base})")
     library = ctypes.PyDLL(str(base))
-    if not hasattr(library, "nldyn_layout") or library.nldyn_layout() != LAYOUT:
-        raise ImportError(f"the engine of nldyn, {base}, is older than its sources: {REBUILT}")
+    if not _fits(library, fingerprint(SOURCES)):
+        raise ImportError(
+            f"the engine of nldyn, {base}, was built from other sources than these: run "
+            f"'python compile_engine.py' in {SOURCES.parents[1]}"
+        )
     wider = FOLDER / library_name("v3")
     baseline = os.environ.get("NLDYN_PROCESSOR") == "baseline"
     if wider.exists() and library.nldyn_runs_v3() and not baseline:

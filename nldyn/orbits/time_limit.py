@@ -15,7 +15,7 @@ class OutOfTimeError(RuntimeError):
 
 
 class TimeLimit:
-    """The processor time that a search may take, to within 0.05 s and what Python does at a stretch.
+    """The processor time that a search may take, to within what Python does at a stretch.
 
     Parameters
     ----------

@@ -18,6 +18,7 @@ import pytest
 
 from nldyn import FlowMap, HarmonicForce, Stop, System, SystemModelError, Unbalance, solve_orbit
 from nldyn.engine import layout, library
+from nldyn.engine.fingerprint import fingerprint
 from nldyn.longterm.growth_rates import growth_rates
 from nldyn.orbits.periodic_schur import product_eigenvalues
 from nldyn.system import CompiledLaw, linear
@@ -211,3 +212,28 @@ def test_a_law_that_is_not_there_is_told(laws):
         CompiledLaw(laws, "hook")
     with pytest.raises(SystemModelError, match=r"law 'hertz': .*nowhere"):
         CompiledLaw("nowhere.so", "hertz")
+
+
+@pytest.mark.skipif(fingerprint(library.SOURCES) is None, reason="sources are not installed")
+def test_an_engine_of_other_sources_says_what_to_run(tmp_path, monkeypatch):
+    """A changed number, by which neither counts of fields nor dates of files tell."""
+    for package in ("fem", "cms", "nldyn"):
+        copy = shutil.copytree(library.SOURCES.parents[1] / package, tmp_path / package)
+    monkeypatch.delenv("NLDYN_ENGINE", raising=False)
+    shutil.copy(library.FOLDER / library.library_name(), copy / "engine")
+
+    def said():
+        command = [sys.executable, "-c", "from nldyn.engine import library; print('loaded')"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        return [line.partition(": ")[2] or line for line in (done.stdout + done.stderr).split("\n")]
+
+    assert said()[0] == "loaded"
+    source = copy / "engine" / "growth.c"
+    source.write_text(source.read_text("utf-8").replace("0", "1"), "utf-8")
+    assert said()[-2] == (
+        f"the engine of nldyn, {copy / 'engine' / library.library_name()}, was built from other "
+        f"sources than these: run 'python compile_engine.py' in {tmp_path}"
+    )
+    for each in [*copy.glob("engine/*.c"), *copy.glob("engine/*.h")]:  # as a wheel installs it
+        each.unlink()
+    assert said()[0] == "loaded"
