@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -92,11 +92,12 @@ class RoundStop:
         a in s/m, see `Stop`.
     law : callable, optional
         Another law of the normal force, see `Stop`.
-    friction : float
+    friction : float, optional
         Coefficient μ, sliding and at rest.
     surface_speed : float, optional
-        Speed in m/s of the surface that turns, ΩR of a rotor, needed where there is friction;
-        positive if the body turns from the first direction to the second, 0 if it does not turn.
+        Speed in m/s of the surface that turns, ΩR of a rotor, needed where there is friction, and
+        only there, if of 0; positive if the body turns from the first direction to the second, 0 if
+        it does not turn.
     restitution : float, optional
         Coefficient e from 0 to 1 of a rigid one.
 
@@ -121,7 +122,7 @@ class RoundStop:
     against_plane: tuple[str, str] | None = None
     dissipation: float = 0.0
     law: ContactLaw | None = None
-    friction: float = 0.0
+    friction: float = cast(float, None)  # not given: zero
     surface_speed: float | None = None
     restitution: float | None = None
     dashpot: ClassVar[float] = 0.0
@@ -149,15 +150,14 @@ class RoundStop:
         object.__setattr__(self, "eccentricity", tuple(float(x) for x in self.eccentricity))
         if not isinstance(self.inside, bool | np.bool_):
             raise SystemModelError(f"{owner}: inside must be True or False, got {self.inside!r}")
+        fault = fault_of_rubbing(self.friction, self.surface_speed)
+        object.__setattr__(self, "friction", 0.0 if self.friction is None else self.friction)
         check_not_negative(owner, "friction", self.friction)
         if self.surface_speed is not None:
             check_finite(owner, "surface_speed", self.surface_speed)
             object.__setattr__(self, "surface_speed", float(self.surface_speed))
-        elif self.friction:
-            raise SystemModelError(
-                f"{owner}: friction needs the surface_speed of what turns, which is 0 of a body "
-                "that does not turn"
-            )
+        if fault:
+            raise SystemModelError(f"{owner} {fault}")
         object.__setattr__(self, "inside", bool(self.inside))
         if self.restitution is None:
             _ = self.normal
@@ -189,7 +189,7 @@ class RoundStop:
         eccentricity: tuple[float, float] = (0.0, 0.0),
         inside: bool = True,
         against_plane: tuple[str, str] | None = None,
-        friction: float = 0.0,
+        friction: float = cast(float, None),
         surface_speed: float | None = None,
     ) -> RoundStop:
         """One that does not give way: impacts along the radius, and rest.
@@ -359,6 +359,22 @@ class RoundStop:
     def along(self, at: Polar) -> Real:
         """Forces (k, 2) that hold the body back where it slides, per unit of the normal force."""
         return self.sense * at.normal + (self.friction * np.sign(at.sliding))[:, None] * at.across
+
+
+def fault_of_rubbing(friction: float | None, surface_speed: float | None) -> str | None:
+    """What is wrong with friction and the speed of a surface, of which None is not given.
+
+    Examples
+    --------
+    >>> fault_of_rubbing(None, 5.0)
+    'has a surface_speed, which needs a friction, or 0'
+    >>> fault_of_rubbing(0.0, 5.0)
+    """
+    if friction and surface_speed is None:
+        return "has friction, which needs the surface_speed of what turns, or 0"
+    if friction is None and surface_speed is not None:
+        return "has a surface_speed, which needs a friction, or 0"
+    return None
 
 
 def _check_pair(owner: str, name: str, pair: object) -> None:

@@ -21,7 +21,7 @@ from nldyn.scene.schema.table import (
     value_of,
 )
 from nldyn.system.rigid_stop import RigidStop
-from nldyn.system.round_stop import RoundStop
+from nldyn.system.round_stop import RoundStop, fault_of_rubbing
 from nldyn.system.stop import LARGEST_EXPONENT, Stop, dashpot_for, dissipation_for, hertz_stiffness
 
 
@@ -205,7 +205,7 @@ class RoundClearanceTable(Table):
     """Two interfaces of what is on the other side; the ground unless given."""
     dissipation: NotNegative = 0.0
     """[s/m] Loss of the contact (Hunt and Crossley): it grows with the penetration, 0 or more."""
-    friction: NotNegative = 0.0
+    friction: NotNegative | None = None
     """Coefficient of the friction along the circle, sliding and sticking."""
     surface_speed: Number | None = None
     """[m/s] Speed of the surface that turns, ΩR of a rotor, above 0 if it turns from the first
@@ -227,10 +227,8 @@ class RoundClearanceTable(Table):
             raise ValueError("needs a 'stiffness', or the law 'rigid'")
         if self.law == "linear":
             refuse(self, ("exponent",), "law 'linear'")
-        if self.friction and self.surface_speed is None:
-            raise ValueError("has 'friction', which needs the 'surface_speed' of what turns, or 0")
-        if self.surface_speed is not None and "friction" not in self.model_fields_set:
-            raise ValueError("has 'surface_speed', which needs a 'friction'")
+        if fault := fault_of_rubbing(self.friction, self.surface_speed):
+            raise ValueError(fault)
         return self
 
     @property
@@ -245,7 +243,7 @@ class RoundClearanceTable(Table):
         return RoundStop(
             (self.plane[0], self.plane[1]), stiffness, self.clearance,
             1.5 if rigid else exponent_of(self), (self.eccentricity[0], self.eccentricity[1]),
-            self.inside, against, self.dissipation, friction=self.friction,
+            self.inside, against, self.dissipation, friction=self.friction or 0.0,
             surface_speed=self.surface_speed, restitution=self.restitution,
         )  # fmt: skip
 
