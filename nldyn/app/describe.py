@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from nldyn.base.arrays import Real
     from nldyn.scene.schema.scene import Scene
     from nldyn.search.diagram import Diagram
-    from nldyn.system.friction import Slider
+    from nldyn.system.friction import Friction, Slider
     from nldyn.system.rigid_stop import AnyStop
     from nldyn.system.round_stop import RoundStop
     from nldyn.system.system import AnySpring, System
@@ -146,7 +146,10 @@ def told_interfaces(system: System) -> list[str]:
         end
         for name in system.areas
         for stop in system.area_stops(name)
-        for end in (stop.at, stop.against, stop.tangent, stop.tangent_against)
+        for end in (
+            *(stop.at, stop.tangent, stop.second_tangent),
+            *(stop.against, stop.tangent_against, stop.second_tangent_against),
+        )
     }
     return [name for name in system.interfaces if name not in points] or list(system.interfaces)
 
@@ -178,7 +181,17 @@ def describe_area(system: System, name: str) -> str:
     told = f"contact area '{name}': {len(stops)} points, {total:.6g} {unit} in all, "
     told += f"gap {gaps[0]:g} m" if len(gaps) == 1 else f"gaps {gaps[0]:g} to {gaps[-1]:g} m"
     told += f", dissipation {first.dissipation:g} s/m" if first.dissipation else ""
-    told += f", friction {first.law_of_friction.coefficient:g}" if first.friction else ""
+    damping = sum(stop.dashpot for stop in stops)
+    told += f", dashpot {damping:.6g} N s/m in all" if damping else ""
+    told += "" if first.pulls else " (never pulls)"
+    if first.tangent is None:
+        return told
+    over = first.second_tangent is not None
+    told += f", friction {_told_law(first.law_of_friction, over)}"
+    told += " over the plane" if over else ""
+    if first.tangential_stiffness is not None:
+        total = sum(stop.tangential_stiffness or 0.0 for stop in stops)
+        told += f", behind {total:.6g} N/m in all"
     return told
 
 
@@ -256,20 +269,26 @@ def describe_slider(slider: Slider, length: str = "m") -> str:
     if slider.across is not None:
         where += f", over the plane with '{slider.across[0]}'"
         where += f" against '{slider.across[1]}'" if slider.across[1] else ""
-    told = f"friction {where}: coefficient {law.coefficient:.6g}"
+    told = f"friction {where}: coefficient {_told_law(law, slider.across is not None, length)}"
+    if slider.tangential_stiffness is not None:
+        told += f", behind {slider.tangential_stiffness:.6g} {moment_unit(length)}/{length}"
+    force = f"{slider.normal_force:.6g} {moment_unit(length)}"
+    pressing = f"stop {slider.stop}" if slider.stop >= 0 else force
+    return f"{told}, pressed on by {pressing}"
+
+
+def _told_law(law: Friction, over_plane: bool, length: str = "m") -> str:
+    """Coefficients of friction and the speeds of what it acts on, along one or two tangents."""
+    told = f"{law.coefficient:.6g}"
     if law.adhesion:
         told += f", at rest {law.at_rest:.6g}, from which it "
         told += (
             f"falls over {law.fading_speed:.6g} {length}/s" if law.fading_speed else "drops at once"
         )
     if any(law.base_speeds):
-        speeds = law.base_speeds if slider.across else law.base_speeds[:1]
+        speeds = law.base_speeds if over_plane else law.base_speeds[:1]
         told += f", base at {' and '.join(f'{speed:.6g}' for speed in speeds)} {length}/s"
-    if slider.tangential_stiffness is not None:
-        told += f", behind {slider.tangential_stiffness:.6g} {moment_unit(length)}/{length}"
-    force = f"{slider.normal_force:.6g} {moment_unit(length)}"
-    pressing = f"stop {slider.stop}" if slider.stop >= 0 else force
-    return f"{told}, pressed on by {pressing}"
+    return told
 
 
 def _place(stop: AnyStop) -> str:

@@ -18,8 +18,8 @@ from nldyn import (
     simulate,
     solve_orbit,
 )
-from nldyn.app.describe import describe_rest, describe_system
-from nldyn.system import rest
+from nldyn.app.describe import describe_rest, describe_stops, describe_system, told_interfaces
+from nldyn.system import Friction, rest
 from nldyn.system.chart import value_of, with_value
 from tests.independent import Motion
 
@@ -252,6 +252,30 @@ def test_an_area_may_be_closed_at_rest_and_is_told_in_a_line():
         "at rest 2 of 2 points of the contact area 'edge' are closed: 0.1 N in all",
     ]
     assert "contact area 'edge': 2 points, 200 N/m in all" in describe_system(pressed)
+
+
+def test_a_line_tells_how_an_area_rubs():
+    """Weights of 0.1 and 0.3 m² in sum: 0.4 times what is given per area."""
+    names = ("a", "b", "ta", "tb", "sa", "sb")
+    points = {**dict(zip(names, np.eye(6), strict=True)), "hub": np.ones(6)}
+
+    def told(free, **more):
+        pads = contact_area("pads", ["a", "b"], 1e4, weights=[0.1, 0.3], **more)
+        system = System.from_matrices(np.eye(6), np.eye(6), points, stops=pads)
+        assert told_interfaces(system) == [*free, "hub"]
+        (line,) = describe_stops(system)
+        return line.removeprefix("contact area 'pads': 2 points, 4000 N/m in all, gap 0 m")
+
+    assert told(names[2:], dashpot=50.0, pulls=False) == ", dashpot 20 N s/m in all (never pulls)"
+    law = Friction(0.2, at_rest=0.3, fading_speed=0.05, base_speed=0.7)
+    assert told(names[4:], friction=law, tangents=["ta", "tb"]) == (
+        ", friction 0.2, at rest 0.3, from which it falls over 0.05 m/s, base at 0.7 m/s"
+    )
+    over = {"friction": 0.2, "tangents": ["ta", "tb"], "tangential_stiffness": 5e3}
+    assert told(names[4:], **over) == ", friction 0.2, behind 2000 N/m in all"
+    assert told((), **over, second_tangents=["sa", "sb"]) == (
+        ", friction 0.2 over the plane, behind 2000 N/m in all"
+    )
 
 
 @pytest.mark.slow
