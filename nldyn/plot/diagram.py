@@ -600,12 +600,16 @@ def draw_legend(
     marked: Mapping[str, Sequence[SpecialPoint]],
     others: Sequence[Line2D] = (),
 ) -> None:
-    """Explain colours, lines and the special points that are marked, and then other lines."""
+    """Explain colours, lines and special points as far as they are drawn, and then other lines."""
     named = {branch.period: branch_kind(branch) for branch in branches}
     entries = [Line2D([], [], color=colours[p], label=named[p]) for p in sorted(named)]
+    runs = [run for b in branches for run in stability_runs([stable for _, stable in _located(b)])]
+    drawn = {run.stable for run in runs if run.stop - run.start > 1}
+    styles = {True: (STABLE, "stable"), False: (UNSTABLE, "unstable")}
     entries += [
-        Line2D([], [], color="0.3", linestyle=STABLE, label="stable"),
-        Line2D([], [], color="0.3", linestyle=UNSTABLE, label="unstable"),
+        Line2D([], [], color="0.3", linestyle=style, label=label)
+        for stable, (style, label) in styles.items()
+        if stable in drawn
     ]
     for kind, points in marked.items():
         count = sum(p.kind == kind for branch in branches for p in branch.special_points)

@@ -108,6 +108,21 @@ def test_diagram_names_units_and_marks():
     ]
 
 
+def test_the_legend_tells_of_no_line_that_is_not_drawn():
+    """A linear system with damping has stable orbits only; between fold and fold there are none."""
+    linear = System.from_modal(
+        [13.1], {"middle": [0.6]}, modal_damping=0.01, excitation=[Unbalance("middle", 5e-6)]
+    )
+    calm = continue_branch(solve_orbit(linear, frequency_hz=10.0), (9.0, 11.0))
+    bent = resonance(count=11)
+    between = [node for node in bent.nodes if 30.0 < node.orbit.frequency_hz < 40.0]
+    unstable = replace(bent, nodes=tuple(between), special_points=())
+    lines = {"stable": calm, "stable, unstable": bent, "unstable": unstable}
+    for told, shown in lines.items():
+        texts = [text.get_text() for text in plot_diagram(shown).get_legend().get_texts()]
+        assert ", ".join(text for text in texts if "stable" in text) == told
+
+
 def test_the_axis_names_the_interface_of_all_branches():
     system = System.from_modal(
         [13.1], {"middle": [0.6], "tip": [1.2]}, modal_damping=0.01,
