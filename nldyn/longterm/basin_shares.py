@@ -178,6 +178,7 @@ def values_over(flow: FlowMap, axis: Axis, points: int) -> list[float]:
     SystemModelError
         If there are none at one of them.
     """
+    axis.check_driven()
     check_whole("points", points, 2, MOST_VALUES)
     values: Sequence[float] = np.linspace(*axis.limits, points).tolist()
     for value in values:

@@ -102,6 +102,20 @@ class Axis:
         """Whether nothing excites the motions, whose frequencies are found."""
         return self.frequency_hz is None and not moves_frequency(self.parameter)
 
+    def check_driven(self) -> None:
+        """Refuse motions that nothing excites, for what needs their frequency.
+
+        Raises
+        ------
+        SystemModelError
+            If nothing excites them.
+        """
+        if self.self_excited:
+            raise SystemModelError(
+                "nothing excites the system, whose motions have frequencies of their own: find "
+                "them by limit_cycle, continue_branch or diagram"
+            )
+
     @property
     def limits(self) -> tuple[float, float]:
         """Lowest and highest value."""
@@ -257,11 +271,7 @@ class Section:
         SystemModelError
             If nothing excites the system.
         """
-        if self.axis.self_excited:
-            raise SystemModelError(
-                "nothing excites the system, whose motions have frequencies of their own: find "
-                "them by limit_cycle, continue_branch or diagram"
-            )
+        self.axis.check_driven()
         return self.value if self.axis.frequency_hz is None else self.axis.frequency_hz
 
     @property

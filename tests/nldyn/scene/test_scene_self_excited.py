@@ -18,10 +18,12 @@ from nldyn.report.answer import answer_lines
 from nldyn.report.contact import contact_figure
 from nldyn.report.render import orbit_to_draw
 from nldyn.report.results import tables_of
+from nldyn.scene.basins import basins_of
 from nldyn.scene.build import build_system
 from nldyn.scene.checks import check_computable
 from nldyn.scene.read import load_scene, parse_scene
 from nldyn.scene.run import compute
+from nldyn.scene.sweep import sweep_of
 
 BLOCK = """
 [matrices]
@@ -199,3 +201,14 @@ def test_what_searches_for_forced_motions_says_so_at_once():
         explore(carried, (0.1, 0.2), 2, parameter="base_speed")
     with pytest.raises(SystemModelError, match="for excited ones"):
         diagram(carried, (0.1, 0.2), parameter="base_speed", doublings=1)
+
+
+def test_what_needs_the_frequency_of_an_excitation_says_so():
+    scene = scene_with()
+    for compute_it in (
+        lambda: basins_of(scene, 0.16),
+        lambda: basins_of(scene, over=3),
+        lambda: sweep_of(scene, points=3),
+    ):
+        with pytest.raises(SceneError, match="nothing excites the system, whose motions have freq"):
+            compute_it()
