@@ -605,12 +605,10 @@ def draw_legend(
     entries = [Line2D([], [], color=colours[p], label=named[p]) for p in sorted(named)]
     runs = [run for b in branches for run in stability_runs([stable for _, stable in _located(b)])]
     drawn = {run.stable for run in runs if run.stop - run.start > 1}
-    styles = {True: (STABLE, "stable"), False: (UNSTABLE, "unstable")}
-    entries += [
-        Line2D([], [], color="0.3", linestyle=style, label=label)
-        for stable, (style, label) in styles.items()
-        if stable in drawn
-    ]
+    if True in drawn:
+        entries.append(Line2D([], [], color="0.3", linestyle=STABLE, label="stable"))
+    if False in drawn:
+        entries.append(Line2D([], [], color="0.3", linestyle=UNSTABLE, label="unstable"))
     for kind, points in marked.items():
         count = sum(p.kind == kind for branch in branches for p in branch.special_points)
         shown = f", {len(points)} of {count}" if len(points) < count else ""
