@@ -821,6 +821,17 @@ def pinned(system: System, jacobians: Real) -> Real:
     return found
 
 
+def kept_places(system: System, jacobians: Real) -> list[int]:
+    """Entries of the state that are such places, by Jacobians (k, N, N) that are `pinned`."""
+    found = []
+    for place in range(2 * system.size, system.state_size, 2):
+        still = np.zeros((len(jacobians), system.state_size))
+        still[:-1, place] = 1.0
+        if np.array_equal(jacobians[:, place], still):
+            found.append(place)
+    return found
+
+
 def _columns(name: str, values: Real, count: int) -> Real:
     values = _floats(name, values)
     if values.ndim == 0 or values.shape[-1] != count:

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from nldyn.base.arrays import Real
 from nldyn.base.errors import (
+    FAILURES,
     ConvergenceError,
     SystemModelError,
     check_frequency,
@@ -23,7 +24,7 @@ from nldyn.base.errors import (
     numbers,
     shown,
 )
-from nldyn.flow.flow_map import FlowMap, flow_of
+from nldyn.flow.flow_map import FlowMap, flow_of, kept_places
 from nldyn.flow.settling import settling_runs, states_after
 from nldyn.longterm.impacts import impacts
 from nldyn.longterm.lyapunov import LyapunovSpectrum, spectrum_from
@@ -36,7 +37,7 @@ from nldyn.longterm.simulation import (
     starting_state,
     transient_end,
 )
-from nldyn.orbits.newton import check_bounded
+from nldyn.orbits.newton import check_bounded, refine
 from nldyn.orbits.orbit import Orbit, check_observe, same_orbit, stroboscopic
 from nldyn.orbits.shooting import LONGEST_PERIOD
 from nldyn.orbits.starts import orbit_near, random_states, settling_periods
@@ -709,7 +710,8 @@ def find_attractors(
     -------
     Attractors
         A list of `Share` that tells what these starts may have missed. Periodic attractors are
-        the same if their orbits are; others if they are of one kind and
+        the same if their orbits are, or differ only by the place at which something sticks behind
+        its spring all the time; others if they are of one kind and
         their stroboscopic states fill the same region.
 
     Raises
@@ -770,10 +772,47 @@ def same_attractor(a: Attractor, b: Attractor) -> bool:
     if a.kind == "failed":
         return a.failure == b.failure
     if a.orbit is not None and b.orbit is not None:
-        return same_orbit(a.orbit, b.orbit)
+        return same_orbit(a.orbit, b.orbit) or side_by_side(a.orbit, b.orbit)
     if a.settling is not None and b.settling is not None:
         return same_orbit(a.settling, b.settling)
     return (a.orbit is None) == (b.orbit is None) and overlap(a.states, b.states)
+
+
+def side_by_side(a: Orbit, b: Orbit) -> bool:
+    """Whether two orbits differ only by where something sticks behind its spring all the time.
+
+    It does so at any place within its friction. Newton's method leads from one to the other if it
+    begins with the one on which the springs of the other's places pull.
+    """
+    problem, kept = a.problem, stuck_places(a)
+    if a.period != b.period or not kept or kept != stuck_places(b):
+        return False
+    flow = problem.flow
+    away = flow.places(stroboscopic(b)[:1])[0] - flow.places(stroboscopic(a)[:1])[0]
+    away = np.where(np.isin(2 * flow.system.size + 2 * np.arange(away.size), kept), away, 0.0)
+    try:
+        nodes = problem.nodes(a.point) + flow.to_state(_pulled(flow.system, away))
+        return same_orbit(refine(problem, nodes, a.omega, a.observe), b)
+    except FAILURES:
+        return False
+
+
+def _pulled(system: System, places: Real) -> Real:
+    """Rest of the linear structure, and the places in m of the springs that pull it there.
+
+    As `FlowMap.to_state` takes it.
+    """
+    numbers = [*system.sprung, *(i for i in system.sprung if i in system.over_planes)]
+    springs = np.array([system.sliders[i].tangential_stiffness or 0.0 for i in numbers])
+    pulls = np.array([system.vector_between(*ends) for ends in system.place_ends])
+    stiffness = system.stiffness + (pulls.T * springs) @ pulls
+    rest = np.linalg.solve(stiffness, pulls.T @ (springs * places))
+    return np.concatenate([rest, np.zeros(system.size), places])
+
+
+def stuck_places(orbit: Orbit) -> list[int]:
+    """Entries of the state that are places at which something sticks all the time."""
+    return kept_places(orbit.system, orbit.jacobians)
 
 
 def overlap(a: Real, b: Real) -> bool:

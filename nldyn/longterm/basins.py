@@ -33,6 +33,7 @@ from nldyn.longterm.attractors import (
     attractor_from,
     find_attractors,
     same_attractor,
+    stuck_places,
 )
 from nldyn.longterm.neighbourhoods import CHUNK, UNDECIDED, Settled, Target, settle, target_of
 from nldyn.orbits.newton import check_bounded
@@ -752,10 +753,26 @@ def _check_known(attractors: Sequence[Attractor], system: System, frequency_hz: 
             )
         if not same_system(attractor.flow.system, system):
             raise SystemModelError(f"attractors: entry {k} is one of another system")
+        _check_apart(attractor)
+
+
+def _check_apart(attractor: Attractor) -> None:
+    """Refuse one of a continuum of motions."""
+    orbit = attractor.orbit
+    places = [] if orbit is None else stuck_places(orbit)
+    if orbit is not None and places:
+        system = orbit.system
+        at = system.place_ends[places[0] // 2 - system.size][0]
+        raise SystemModelError(
+            f"basins: at '{at}' something sticks behind its spring all the time, in a motion of "
+            f"period {orbit.period} at {orbit.frequency_hz:g} Hz, as it may at any place within "
+            "its friction: such motions lie side by side, and none of them has a basin"
+        )
 
 
 def _add(known: list[Attractor], attractor: Attractor) -> None:
     """Keep what is an attractor, and new."""
+    _check_apart(attractor)
     if attractor.lasting and not any(same_attractor(attractor, other) for other in known):
         known.append(attractor)
 
