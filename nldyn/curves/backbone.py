@@ -64,6 +64,7 @@ STEPS = ContinuationOptions(
 EARLY = 0.1  # rad behind a turn, of which half a turn is a period of the linear mode
 WIDEST = 1e3  # of the range of frequencies on either side of the linear one
 SURELY = 1e-6  # beyond the unit circle, from which an orbit counts as unstable
+SAME = 1e-9  # relative difference of squared frequencies that is rounding of the modes
 UNSEEN = 1e-12  # share of a mode at an interface that is rounding
 
 
@@ -380,9 +381,12 @@ def _begin(flow: FlowMap, observe: str, mode: int, amplitude: float) -> BranchNo
     phase = Phase.of(family.at(guess))
     found = correct(family, guess, phase, row)
     if not found.converged:
+        alike = np.flatnonzero(np.isclose(squares, squares[mode - 1], rtol=SAME, atol=0.0)) + 1
+        shared = [f"mode {other}" for other in alike if other != mode]
         raise ConvergenceError(
-            f"no free motion of {amplitude:g} m at '{observe}' was found near mode {mode}: "
-            f"{found.failure}; begin with another amplitude"
+            f"no free motion of {amplitude:g} m at '{observe}' was found near mode {mode}"
+            + (f", whose frequency is that of {' and '.join(shared)}, too" if shared else "")
+            + f": {found.failure}; begin with another amplitude"
         )
     return node_of(found, outward, 0.0)
 

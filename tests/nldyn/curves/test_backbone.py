@@ -5,9 +5,11 @@ import pytest
 from scipy.special import ellipk
 
 from nldyn import (
+    ConvergenceError,
     HarmonicForce,
     PolynomialSpring,
     RigidStop,
+    RoundStop,
     Spring,
     Stop,
     System,
@@ -113,6 +115,16 @@ def test_two_masses_with_a_cubic_spring_between(mode, linear, cubic):
     found = backbone(system, mode, amplitude_m=(1e-3, 1.0))
     exact = duffing_hz(found.amplitude, linear, cubic)
     assert found.frequency_hz == pytest.approx(exact, rel=1e-9)
+
+
+def test_modes_of_one_frequency_are_told_where_no_motion_is_found():
+    """In a ring all directions are alike: the orbits of any size are a family in two numbers."""
+    system = System.from_matrices(
+        np.eye(2), np.eye(2), {"x": [1.0, 0.0], "y": [0.0, 1.0]},
+        stops=[RoundStop(("x", "y"), 1.0, 0.5)],
+    )  # fmt: skip
+    with pytest.raises(ConvergenceError, match="mode 1, whose frequency is that of mode 2, too: "):
+        backbone(system, amplitude_m=(1e-3, 1.0))
 
 
 @pytest.mark.parametrize(
