@@ -344,11 +344,7 @@ def harmonic_branch(system: System, setting: LoadCase, tell: Callable[[float], N
     try:
         orbit = _orbit_at(axis, system, axis.moved(high, -SLACK), setting)
     except ConvergenceError as error:
-        rigid = system.free_modes
-        if not rigid:
-            raise
-        modes = f"{rigid} mode{'' if rigid == 1 else 's'} at 0 Hz"
-        raise ConvergenceError(f"{error}; nothing holds the structure: it has {modes}") from None
+        raise _explained(error, system) from None
     return continue_branch(orbit, axis.limits, parameter=axis.parameter, progress=tell)
 
 
@@ -374,33 +370,49 @@ def harmonic_pieces(
     If it does not come to the lower end, also the branch from there; if both leave out the
     place of the study, also the one through the orbit there. With notes on starts without an
     orbit.
+
+    Raises
+    ------
+    ConvergenceError
+        If there is an orbit at none of these.
     """
-    pieces, notes = [harmonic_branch(system, setting, tell)], []
+    pieces: list[Branch] = []
+    missing: dict[str, ConvergenceError] = {}
     axis = axis_of(setting, system)
-    low, _ = axis.limits
-    reached, _ = pieces[0].span
+    low, high = axis.limits
 
     def still(_: float) -> None:
-        tell(reached)
+        tell(pieces[0].span[0])
 
-    for value in (axis.moved(low, SLACK), at):
+    for value in (axis.moved(high, -SLACK), axis.moved(low, SLACK), at):
         if covers([piece.span for piece in pieces], (value, value), axis):
             continue
         try:
             orbit = _orbit_at(axis, system, value, setting)
         except ConvergenceError as error:
-            notes.append(f"a branch through {axis.told(value)} is missing: {error}")
+            missing[f"a branch through {axis.told(value)} is missing: {error}"] = error
             continue
         pieces.append(
             continue_branch(
                 orbit,
                 axis.limits,
                 parameter=axis.parameter,
-                progress=still,
+                progress=still if pieces else tell,
                 open_ends=[end for piece in pieces for end in open_ends(piece)],
             )
         )
-    return pieces, notes
+    if not pieces:
+        raise _explained(next(iter(missing.values())), system)
+    return pieces, list(missing)
+
+
+def _explained(error: ConvergenceError, system: System) -> ConvergenceError:
+    """Why there is no orbit, with what may be behind it."""
+    rigid = system.free_modes
+    if not rigid:
+        return error
+    modes = f"{rigid} mode{'' if rigid == 1 else 's'} at 0 Hz"
+    return ConvergenceError(f"{error}; nothing holds the structure: it has {modes}")
 
 
 def merged(spans: Iterable[tuple[float, float]], axis: Axis) -> tuple[tuple[float, float], ...]:

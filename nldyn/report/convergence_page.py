@@ -143,8 +143,9 @@ def eigenfrequencies(model: Measured) -> list[float]:
 
 
 def of(number: Callable[[Orbit], float], orbit: Orbit | None) -> list[float]:
-    """A number of an orbit, if there is one."""
-    return [] if orbit is None else [float(number(orbit))]
+    """A number of an orbit, if there is one; impacts on a rigid stop have no largest force."""
+    found = [] if orbit is None else [float(number(orbit))]
+    return [value for value in found if math.isfinite(value)]
 
 
 def of_peak(number: Callable[[Orbit], float]) -> Callable[[Measured], list[float]]:

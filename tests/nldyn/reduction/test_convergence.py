@@ -18,6 +18,7 @@ from nldyn import (
     Damper,
     HarmonicForce,
     LoadCase,
+    RigidStop,
     SceneError,
     Stop,
     System,
@@ -37,6 +38,7 @@ from nldyn.reduction.model_errors import (
     distance,
     errors_of,
     harmonic_branch,
+    harmonic_pieces,
     largest_force,
     massless_receptance,
     matched,
@@ -104,6 +106,16 @@ def test_contacts_are_compared_only_where_there_are_any():
     assert "contact force" not in study.report()
 
 
+def test_impacts_on_a_rigid_stop_have_no_force_to_compare(tmp_path):
+    rigid = replace(SETTING, stops=(RigidStop("middle", 0.8),), limits=(36.0, 36.2))
+    study = convergence_study(string(), rigid, modes=(1, 2))
+    assert all(model.orbit.impacts > 0 for model in study.models if model.orbit)
+    assert [panel["name"] for panel in panels(study)] == ["eigenfrequencies"]
+    write_study(study, tmp_path)
+    with (tmp_path / "convergence.csv").open() as file:
+        assert {row["force_n"] for row in csv.DictReader(file)} == {""}
+
+
 def test_a_structure_that_nothing_holds_is_told():
     K = 1e5 * (np.diag([1.0, 2.0, 1.0]) - np.eye(3, k=1) - np.eye(3, k=-1))
     loads = {"middle": np.eye(3)[1], "end": np.eye(3)[2]}
@@ -111,6 +123,24 @@ def test_a_structure_that_nothing_holds_is_told():
     setting = replace(SETTING, stops=(), excitation=(Unbalance("middle", 1e-4),))
     with pytest.raises(ConvergenceError, match="nothing holds the structure: it has 1 mode at 0"):
         harmonic_branch(setting.system(free), setting, print)
+
+
+def test_where_there_is_no_orbit_at_the_upper_end_the_branch_comes_from_the_lower_one(monkeypatch):
+    """A linear system: its branch reaches the upper end, where no orbit was found to begin with."""
+    far = replace(SETTING, stops=())
+    system = far.system(cms.reduce(string(), modes=2))
+    low, high = far.limits
+    orbit_at = model_errors._orbit_at
+
+    def fails_at_the_end(axis, system, value, setting):
+        if value > 0.99 * high:
+            raise ConvergenceError("no orbit")
+        return orbit_at(axis, system, value, setting)
+
+    monkeypatch.setattr(model_errors, "_orbit_at", fails_at_the_end)
+    (branch,), (note,) = harmonic_pieces(system, far, high, lambda hz: None)
+    assert branch.span == pytest.approx((low, high), rel=1e-8)
+    assert note == f"a branch through {high:g} Hz is missing: no orbit"
 
 
 def test_errors_fall_with_the_number_of_modes(study):
