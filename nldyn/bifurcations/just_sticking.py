@@ -1,12 +1,14 @@
-"""Motions in which something just comes to rest on friction that drops at once.
+"""Motions in which something just comes to rest, or loose, on friction that drops at once.
 
 If it came a little slower it would stay for a while, if it were pulled a little more it would not
-stay at all: motions on both sides are not alike, and a branch ends there or has a corner.
+stay at all: motions on both sides are not alike, and a branch ends there or has a corner. If it
+were pulled a little less it would not come loose at all, and a branch ends.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.polynomial import Legendre
 
 from nldyn.base.arrays import Real
 from nldyn.flow.sliding import held_in_pieces
@@ -34,6 +36,45 @@ def just_sticks(orbit: Orbit) -> Slider | None:
         if _touches_rest(slips) or _turns_or_stays(orbit, number, fastest):
             return slider
     return None
+
+
+def just_slips(orbit: Orbit) -> Slider | None:
+    """A slider that is only just pulled loose, where its friction drops at once.
+
+    The pull has all but its peak there: the instant, and with it a multiplier, goes with the root
+    of what is left, so that it tends to infinity.
+    """
+    for number, slider in enumerate(orbit.system.sliders):
+        law = slider.friction
+        if law.adhesion == 0.0 or law.fading_speed is not None:
+            continue
+        slopes, fastest = _last_slopes(orbit, number)
+        if np.abs(slopes).min(initial=np.inf) < SLOW * fastest:
+            return slider
+    return None
+
+
+def _last_slopes(orbit: Orbit, number: int) -> tuple[Real, float]:
+    """Rates at which friction at rest lets go, and the fastest of what it has left meanwhile."""
+    motion, slider = orbit.trajectory, orbit.system.sliders[number]
+    record, tables = motion.record, motion.flow.tables
+    row, law = len(orbit.system.stops) + number, slider.friction
+    held = held_in_pieces(motion, number)
+    loose = held & ~np.roll(held, -1) & (record.event == row)
+    slopes, fastest = [], 0.0
+    for piece in np.flatnonzero(held):
+        at = tables.chi[record.kind[piece]]
+        pressing = np.full(at.size, slider.normal_force)
+        if slider.stop >= 0:
+            pressing = motion.contacts_at_nodes[1][piece, slider.stop]
+        force = record.force[piece, row]
+        left = (law.coefficient + law.adhesion) * pressing - np.sign(force[-1]) * force
+        rate = Legendre.fit(at, left, at.size - 1, domain=[0.0, 1.0]).deriv()
+        scale = record.duration[piece]
+        fastest = max(fastest, float(np.abs(rate(at)).max()) / scale)
+        if loose[piece]:
+            slopes.append(float(rate(1.0)) / scale)
+    return np.array(slopes), fastest
 
 
 def _touches_rest(slips: Real) -> bool:

@@ -18,7 +18,7 @@ from nldyn.bifurcations.beyond_rigid_grazing import DIFFERENCED, SLIGHTEST
 from nldyn.bifurcations.branch_crossing import SHORTEST_CROSSING
 from nldyn.bifurcations.codimension_two import is_torus, is_torus_curve
 from nldyn.bifurcations.corners import CORNER_STEP, MEETS, corner_ahead, extremes_meet
-from nldyn.bifurcations.just_sticking import just_sticks
+from nldyn.bifurcations.just_sticking import just_slips, just_sticks
 from nldyn.bifurcations.last_slip import LEAST, LITTLE, last_slip
 from nldyn.bifurcations.on_curve import FARTHEST_NODE, on_chart_plane, on_plane
 from nldyn.bifurcations.period_doubling import flip_between, passed_flip
@@ -235,6 +235,9 @@ class Stepper:
                 alone = here.family.in_frequency_alone
                 place = f"{resonance:.9g} Hz" if alone else _beside(here)
                 return Ending.GROWS.told(place=place)
+            slider = just_slips(here.orbit)
+            if slider is not None:
+                return Ending.JUST_SLIPS.told(at=slider.at, place=place_of(here, 9))
             share = _rounding(here)
             if share > LOST_IN_ROUNDING:
                 place = place_of(here)

@@ -57,6 +57,10 @@ class Ending(Enum):
         "what slides at '{at}' just comes to rest at {place}: friction drops at once, so that "
         "motions beyond it are not alike"
     )
+    JUST_SLIPS = (
+        "what sticks at '{at}' is only just pulled loose at {place}, where a multiplier tends to "
+        "infinity, since friction drops at once"
+    )
     STICKS = (
         "what slides at '{at}' slides less and less, up to none at all: from near {place} on it "
         "sticks all the time"

@@ -20,7 +20,7 @@ from nldyn import (
     continue_branch,
     solve_orbit,
 )
-from nldyn.bifurcations.just_sticking import just_sticks
+from nldyn.bifurcations.just_sticking import just_slips, just_sticks
 from nldyn.branches.endings import Ending
 from nldyn.flow.sliding import slider_measures
 from nldyn.report.answer import answer_lines
@@ -130,6 +130,23 @@ def test_motions_with_one_stop_a_cycle_end_where_that_takes_no_time():
     assert just_sticks(last) is not None
     assert just_sticks(branch.points[len(branch.points) // 2]) is None
     assert just_sticks(solve_orbit(block(0.4, 0.8), 0.7 / TURN)) is None
+
+
+def test_a_branch_ends_where_the_pull_just_reaches_the_friction_at_rest():
+    """Its peak: the whole force of 1 N with that of the spring of 1 N/m at the place of rest."""
+    law = Friction(0.9, at_rest=1.0)
+    pulled = System.from_matrices(
+        [[1.0]], [[1.0]], {"x": [1.0]}, damping=[[0.05]], dampers=[DryFriction("x", 1.0, law)],
+        excitation=[HarmonicForce("x", 1.0)],
+    )  # fmt: skip
+    start = solve_orbit(pulled, 0.4 / TURN)
+    branch = continue_branch(start, (0.89, 1.0), parameter="friction")
+    end, reason = branch.nodes[-1], branch.stop_reasons[1]
+    assert reason.ending is Ending.JUST_SLIPS and reason.values["at"] == "x"
+    place = abs(float(end.orbit.states(np.array([math.pi]))[0, 0]))
+    assert end.value + 0.1 == pytest.approx(1.0 + place, rel=1e-9)
+    assert abs(end.orbit.multipliers[0]) > 1e6
+    assert just_slips(end.orbit) is not None and just_slips(start) is None
 
 
 def test_a_block_slides_up_to_where_the_whole_force_is_friction():
