@@ -233,12 +233,14 @@ static Course depth_now(const Flow *fl, int s, const double *w, double phase)
     return (Course){at.depth, at.rate, stop_of(fl, s)->sense * push, 0.0};
 }
 
-/* force of a row; sliders that stops press on, and what keeps an acceleration, are left out */
+/* force of a closed row; sliders that stops press on, and what keeps an acceleration, are left out.
+ * At its switch a dashpot acts, on whichever side rounding puts the penetration. */
 static double force_now(const Flow *fl, int s, const double *w, double phase)
 {
     if (!is_planar(fl, s)) {
         Course depth = depth_now(fl, s, w, phase);
-        return law(fl, s, depth.value, depth.first).force;
+        return is_elastic(fl, s) ? closed_law(fl, s, depth.value, depth.first).force
+                                 : law(fl, s, depth.value, depth.first).force;
     }
     int lead = is_round(fl, s) ? s : (int)stop_of(fl, s)->lead;
     if (is_rigid(fl, lead)) return 0.0;

@@ -28,7 +28,9 @@ static double sliding_share(const Motion *M, int s, double phase)
  * The force jumps by c δ', and the switch moves by -dδ/δ' with the penetration there: together
  * they change the velocities by c dδ [Aizerman and Gantmacher 1958]. So do those of sliders that it
  * presses on, or that slip as it was more than their friction: they `held` that much before. What is
- * held on takes its share of the impulse. */
+ * held on takes its share of the impulse. Over an ever slower touch these remain bounded, for what
+ * slips lacked no more to its friction than a share of c δ'; but where friction drops at once they
+ * grow with 1/δ', as they are: a grazing then decides whether it slips at all. */
 static void jump_columns(Motion *M, int stop, double phase, double t, bool closes,
                          const double *held)
 {

@@ -179,6 +179,32 @@ def test_derivatives_pass_a_dashpot_that_is_hit_while_something_sticks(law):
     assert off_differences(flow, found, z, phases, 1.0, 1e-6) < 5e-6
 
 
+@pytest.mark.parametrize("speed", [1e-1, 1e-3, 1e-4])
+@pytest.mark.parametrize("drop", [0.0, 0.1])
+def test_derivatives_by_a_slow_touch_that_lets_something_slip_are_in_closed_form(drop, speed):
+    """A touch that comes later by dx/v takes what it changes of the forces, M dv = -ΔF dx/v.
+
+    Pulled with h, half the dashpot's share less than friction at rest holds, it slips at once: the
+    forces change by c v in x, and by what is no longer held in y. With one coefficient that share
+    goes with v; where friction drops at once it does not, and a grazing has no derivatives.
+    """
+    mass, c, gap, soon = np.array([[1.0, 0.5], [0.5, 1.0]]), 2.0, 0.3, 1e-6
+    held = 1.0 + drop - 0.25 * c * speed
+    system = System.from_matrices(
+        mass, np.eye(2), {"x": [1.0, 0.0], "y": [0.0, 1.0]}, damping=np.zeros((2, 2)),
+        stops=[Stop("x", 20.0, 1.0, gap, dashpot=c)],
+        dampers=[DryFriction("y", 1.0, Friction(1.0, 1.0 + drop))],
+        excitation=[ConstantForce("y", held - 0.5 * gap)],  # at rest y takes its share of x'' = -x
+    )  # fmt: skip
+    back = [gap - (speed + 0.5 * gap * soon) * soon, 0.0, speed + gap * soon, 0.0]  # x'' = -gap
+    flow, start = FlowMap(system), to_state(system, np.array(back))[None]
+    found = flow.shoot(start, np.array([0.0, 2.0 * soon]), 1.0)
+    assert not found.failure and found.closings[0] == 1
+    by_x = from_state(system, found.jacobians[0] @ to_state(system, np.eye(4)[0]))
+    exact = np.linalg.solve(mass, [-c, (held - 1.0) / speed])
+    assert by_x[2:] == pytest.approx(exact, rel=2e-5)
+
+
 @pytest.mark.parametrize(("name", "index"), [("friction", 0), ("friction", 1), ("normal_force", 1)])
 @pytest.mark.parametrize(
     "laws", [(Friction(0.3, 0.5, 0.2), 0.4), (Friction(0.3, 0.5), Friction(0.4, 0.6))]
