@@ -140,7 +140,7 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     s->part = numbers(block, (size_t)m * n_columns);
     s->change = numbers(block, n_columns);
     s->last_forces = numbers(block, na * (1 + n_columns));
-    if (na * m >= FEWER) {
+    if (na * m >= MANY || na * m >= (size_t)fewest_unknowns(fl)) {
         s->added = numbers(block, na * m * n_columns);
         s->driven_many = numbers(block, (na > size ? na : size) * m * n_columns);
         s->pushing = numbers(block, na * size);
