@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
+from scipy.integrate import OdeSolution, solve_ivp
 
 from nldyn.system import Friction
 
@@ -86,7 +86,8 @@ class Body:
     places of what slides behind springs.
 
     Modes: nan for an open one, 0 where it sticks, else the sign of its speed. Times and ways are
-    what `followed` adds up: how long each contact sticks and slides, and how far.
+    what `followed` adds up: how long each contact sticks and slides, and how far. If asked for, it
+    keeps the modes between events with the motion there, as a function of time.
     """
 
     mass: Vector
@@ -99,6 +100,8 @@ class Body:
     stuck: Vector = field(default_factory=lambda: np.zeros(0))
     slid: Vector = field(default_factory=lambda: np.zeros(0))
     way: Vector = field(default_factory=lambda: np.zeros(0))
+    keeps: bool = False
+    kept: list[tuple[list[float], OdeSolution]] = field(default_factory=list)
 
     def acting(self, t: float, y: Vector) -> tuple[Vector, dict[int, float]]:
         """All forces, and what holds those that stick."""
@@ -285,8 +288,10 @@ class Body:
             run = solve_ivp(
                 self.rate, (t, end), y, method="DOP853", rtol=1e-12, atol=1e-15,
                 max_step=longest, first_step=min(FIRST_STEP, end - t) if sprung else None,
-                events=[event for _, _, event in events],
+                events=[event for _, _, event in events], dense_output=self.keeps,
             )  # fmt: skip
+            if self.keeps:
+                self.kept.append((list(self.modes), run.sol))
             self.add_up(float(run.t[-1]) - t, run.y[:, -1] - y)
             t, y = float(run.t[-1]), run.y[:, -1]
             for (i, kind, _), times in zip(events, run.t_events or [], strict=True):

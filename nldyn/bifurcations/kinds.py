@@ -25,12 +25,16 @@ class Kind:
     multiplier: float = math.nan
 
 
+CROSSING_SLIDING, GRAZING_SLIDING, ADDING_SLIDING = SLIDING = "CS", "GS", "AS"
 KINDS = {
     "LP": Kind("cyclic fold", "o", 1.0),
     "PD": Kind("flip", "s", -1.0),
     "NS": Kind("Neimark-Sacker", "D"),
     "BP": Kind("branch point", "^", 1.0),
     "GR": Kind("grazing", "x"),
+    CROSSING_SLIDING: Kind("crossing-sliding", "<"),
+    GRAZING_SLIDING: Kind("grazing-sliding", "p"),
+    ADDING_SLIDING: Kind("adding-sliding", ">"),
 }
 EVENT_MARKERS = {"phase resonance": "P", "amplitude antiresonance": "v", "Hopf": "h"}
 

@@ -15,14 +15,17 @@ from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
 from nldyn.bifurcations.point import BranchNode
+from nldyn.bifurcations.sliding import sticks, words
 from nldyn.flow.flow_map import Trajectory
 from nldyn.flow.sliding import held_in_pieces
+from nldyn.orbits.orbit import Orbit
 from nldyn.system.friction import Slider
 
 LEAST = 1e-6  # of the longest way of the walk: one that counts as the last, and
 LITTLE = 1e-3  # where a walk cannot go on
 STICKS = 0.5  # least share of the time in which it does
 SPREAD = 2.0  # factor between the ways by which the limit is found
+JUST = 1e-5  # of friction: a difference of the largest force from it that is none
 FARTHEST = 10.0  # times the way of the parameter between these
 
 
@@ -41,6 +44,20 @@ def last_slip(path: Sequence[BranchNode], least: float = LEAST) -> tuple[Slider,
         limit = _limit(ways, np.array([node.value for node in path]))
         if limit is not None:
             return slider, limit
+    return None
+
+
+def first_slip(orbit: Orbit) -> Slider | None:
+    """The slider that sticks behind its spring all the time, and just needs all its friction.
+
+    Where it is tells the first place of many in which it would slide.
+    """
+    for number, slider in enumerate(orbit.system.sliders):
+        if slider.tangential_stiffness is None or slider.stop >= 0:
+            continue
+        found, most = orbit.friction[number], slider.friction.coefficient * slider.normal_force
+        if sticks(words(orbit)[number]) == -1 and abs(found.peak_force - most) < JUST * most:
+            return slider
     return None
 
 

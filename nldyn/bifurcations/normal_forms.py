@@ -20,7 +20,7 @@ from nldyn.base.errors import (
     check_types,
     failing_as,
 )
-from nldyn.bifurcations.kinds import KINDS
+from nldyn.bifurcations.kinds import GRAZING_SLIDING, KINDS, SLIDING
 from nldyn.bifurcations.normal_form_coefficients import (
     CoefficientError,
     Coefficients,
@@ -43,7 +43,8 @@ from nldyn.bifurcations.point import (
 )
 from nldyn.bifurcations.rigid_grazing import RigidGrazing, RootMap, turned
 from nldyn.bifurcations.rigid_touch import Touches
-from nldyn.bifurcations.self_excited import GRAZING_SLIDING, HOPF
+from nldyn.bifurcations.self_excited import HOPF
+from nldyn.bifurcations.sliding_forms import changes_at, told
 from nldyn.orbits.bordered import FREE, Place, correct
 from nldyn.orbits.conditions import Grazing, output_slope
 from nldyn.orbits.orbit import Orbit, minimal_period
@@ -139,7 +140,8 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
     Raises
     ------
     SystemModelError
-        For a kind of point that is none of LP, PD, NS, BP and GR, and no event of a branch.
+        For a kind of point that is none of LP, PD, NS, BP, GR, CS, GS and AS, and no event of a
+        branch.
 
     References
     ----------
@@ -147,9 +149,8 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
     """
     if getattr(getattr(special, "orbit", None), "self_excited", False):
         return _of_limit_cycle(special)
-    check_special(
-        "describe_special", special, of_branch=getattr(special, "kind", "") in ("GR", "BP")
-    )
+    kind = getattr(special, "kind", "")
+    check_special("describe_special", special, of_branch=kind in ("GR", "BP", *SLIDING))
     check_types(others=(others, Sequence))
     for other in others:
         check_special("describe_special: others", other, of_branch=False)
@@ -158,6 +159,8 @@ def normal_form(special: SpecialPoint, others: Sequence[SpecialPoint] = ()) -> N
     special = on_branch(special)
     if special.kind == "GR":
         return _grazing(special, others)
+    if special.kind in SLIDING:
+        return _sliding(special)
     kinds = {"LP": _fold, "PD": _flip, "NS": _torus, "BP": _branch_point}
     if special.kind not in kinds:
         raise SystemModelError(f"no special point is of the kind {special.kind!r}")
@@ -181,7 +184,7 @@ def _of_limit_cycle(special: SpecialPoint) -> NormalForm:
         "NS": ("torus", "quasi-periodic motions branch off"),
         "BP": ("branch point", "branches of limit cycles cross"),
         "GR": ("grazing", "the limit cycle touches a stop without speed"),
-        GRAZING_SLIDING: (GRAZING_SLIDING, "sticking begins or ends, and the branch may turn"),
+        GRAZING_SLIDING: ("grazing-sliding", "sticking begins or ends, and the branch may turn"),
         HOPF: ("Hopf point", "the limit cycle has shrunk to rest"),
     }[special.kind]
     title = name[0].upper() + name[1:]
@@ -641,6 +644,17 @@ def _stability_at_grazing(special: SpecialPoint, others: Sequence[SpecialPoint])
         named = ", ".join(f"{other.kind} at {_hz(other)}" for other in close)
         return f"{said}, but a special point is close by ({named})."
     return f"{said}."
+
+
+# --- sliding -------------------------------------------------------------------------------------
+
+
+def _sliding(special: SpecialPoint) -> NormalForm:
+    """Where a motion begins or ceases to stick; no coefficient is computed."""
+    name, changes = KINDS[special.kind].words, changes_at(special)
+    sentence = f"{name[0].upper()}{name[1:]} at {_hz(special)}: {told(special, changes)}."
+    side, stable = (changes[0].side, changes[0].stable) if changes else (0, None)
+    return NormalForm(name, sentence, side=side, stable=stable)
 
 
 # --- all -----------------------------------------------------------------------------------------

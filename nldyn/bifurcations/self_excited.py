@@ -16,6 +16,7 @@ from nldyn.base.arrays import TINY, Real
 from nldyn.base.errors import FAILURES
 from nldyn.bifurcations.branch_crossing import distance
 from nldyn.bifurcations.chord import Chord
+from nldyn.bifurcations.kinds import GRAZING_SLIDING
 from nldyn.bifurcations.point import BranchNode, node_of
 from nldyn.orbits.bordered import Corrected, correct
 from nldyn.orbits.conditions import Turning
@@ -23,7 +24,7 @@ from nldyn.orbits.orbit import Orbit
 from nldyn.orbits.self_excited import SAMPLES, samples
 from nldyn.orbits.shooting import metric_length
 
-GRAZING_SLIDING, HOPF = "grazing-sliding", "Hopf"
+HOPF = "Hopf"
 SMALL = 1e-3  # swing beside that a step before, at which a limit cycle counts as rest
 LOST = 10.0  # times the error of the multiplier along it, which is that of so small a motion
 BEHIND = (1e-4, 1e-3)  # distances from the corner at which an orbit behind it is looked for

@@ -19,7 +19,7 @@ from nldyn.bifurcations.branch_crossing import SHORTEST_CROSSING
 from nldyn.bifurcations.codimension_two import is_torus, is_torus_curve
 from nldyn.bifurcations.corners import CORNER_STEP, MEETS, corner_ahead, extremes_meet
 from nldyn.bifurcations.just_sticking import just_slips, just_sticks
-from nldyn.bifurcations.last_slip import LEAST, LITTLE, last_slip
+from nldyn.bifurcations.last_slip import LEAST, LITTLE, first_slip, last_slip
 from nldyn.bifurcations.on_curve import FARTHEST_NODE, on_chart_plane, on_plane
 from nldyn.bifurcations.period_doubling import flip_between, passed_flip
 from nldyn.bifurcations.point import BranchNode, place_of
@@ -247,6 +247,9 @@ class Stepper:
                 return Ending.JUST_STICKS.told(at=slider.at, place=place_of(here, 9))
             if self._ceases_to_slide(here, here, LITTLE) is not None:
                 return self.stop_reason
+            slider = first_slip(here.orbit)
+            if slider is not None:
+                return Ending.BEGINS_TO_SLIDE.told(at=slider.at, place=place_of(here, 9))
         return Ending.SHORT_STEP.told(step=f"{self.options.min_step:g}", obstacle=self._obstacle)
 
     def begin_anew(self, here: BranchNode, step: float) -> None:

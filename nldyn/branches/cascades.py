@@ -17,6 +17,7 @@ from nldyn.bifurcations.normal_form_coefficients import (
 )
 from nldyn.bifurcations.period_doubling import switch_at_flip
 from nldyn.bifurcations.point import BranchNode, SpecialPoint, check_special, is_at, on_branch
+from nldyn.bifurcations.sliding import sliding_points_between
 from nldyn.bifurcations.within_step import special_points_between
 from nldyn.branches.arclength import Stepper
 from nldyn.branches.branch import Branch, check_branches
@@ -251,11 +252,17 @@ def _up_to_flip(
     return make_branch("", nodes, specials, (first, reason), []), following
 
 
+def _special_points(a: BranchNode, b: BranchNode) -> list[SpecialPoint]:
+    """All special points between two neighbouring points, in order."""
+    found = [*special_points_between(a, b), *sliding_points_between(a, b)[0]]
+    return sorted(found, key=lambda special: special.point.arclength)
+
+
 def _with_special_points(walk: Stepper) -> Iterator[tuple[BranchNode, list[SpecialPoint]]]:
     """Points of a walk with the special points between each and the one before."""
     before: BranchNode | None = None
     for point in walk:
-        yield point, [] if before is None else special_points_between(before, point)
+        yield point, [] if before is None else _special_points(before, point)
         before = point
 
 

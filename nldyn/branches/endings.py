@@ -65,6 +65,10 @@ class Ending(Enum):
         "what slides at '{at}' slides less and less, up to none at all: from near {place} on it "
         "sticks all the time"
     )
+    BEGINS_TO_SLIDE = (
+        "what sticks all the time at '{at}' begins to slide at {place}: it sticks in one of many "
+        "places, and from there on in others or none"
+    )
     FAILS = "what lies beyond {place} could not be computed: {obstacle}"
     MOST_POINTS = "{points} points"
     SHORT_STEP = "step below {step}: {obstacle}"

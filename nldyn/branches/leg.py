@@ -22,6 +22,7 @@ from nldyn.bifurcations.branch_crossing import NEIGHBOUR, distance, same_crossin
 from nldyn.bifurcations.chord import Chord
 from nldyn.bifurcations.marks import marks_between
 from nldyn.bifurcations.point import BranchNode, SpecialPoint, place_of
+from nldyn.bifurcations.sliding import sliding_points_between
 from nldyn.bifurcations.touching import grazes_exactly, rigid_grazing, rigid_touches
 from nldyn.bifurcations.within_step import insert_dip, special_points_between
 from nldyn.branches.arclength import Stepper, StepperState
@@ -337,9 +338,19 @@ class LegBuilder:
                     found, lost = every, []
                 self.special_points += found
                 self.notes += lost
+            self._add_sliding(a, b)
             self._searched += 1
         if self._free and len(self.special_points) > known:
             self.special_points = without_repeats(self.special_points)
+
+    def _add_sliding(self, a: BranchNode, b: BranchNode) -> None:
+        """Add where a motion begins or ceases to stick between two points, the last searched."""
+        found, lost = sliding_points_between(a, b)
+        self.notes += lost
+        if found:
+            first = bisect(self.special_points, a.arclength, key=_length)
+            found += self.special_points[first:]
+            self.special_points[first:] = sorted(found, key=_length)
 
     def _along_straight_way(self, a: BranchNode, b: BranchNode) -> list[SpecialPoint] | None:
         """All special points on a walk with shorter steps, if it leads from a to b straight.
@@ -359,6 +370,10 @@ class LegBuilder:
         way = [replace(p, arclength=x) for p, x in zip(between, lengths, strict=True)]
         found, lost = _in_pieces([a, *way, b])
         return None if lost else found
+
+
+def _length(special: SpecialPoint) -> float:
+    return special.point.arclength
 
 
 def _told(node: BranchNode) -> float | Real:

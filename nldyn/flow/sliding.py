@@ -224,10 +224,15 @@ def _times_of_nodes(motion: Trajectory, panels: NDArray[np.intp]) -> Real:
     return np.asarray(motion.flow.tables.weights[rec.kind[panels]] * rec.duration[panels, None])
 
 
+def touching_pieces(motion: Trajectory, stop: int) -> NDArray[np.bool_]:
+    """In which pieces (pieces,) of a motion a stop is closed."""
+    rec, rows = motion.record, motion.flow.round_rows.get(stop, [stop])
+    return np.asarray((rec.kind >= 0) & rec.depth[:, rows].any(axis=(1, 2)))
+
+
 def _touching(motion: Trajectory, stop: int) -> NDArray[np.intp]:
     """The panels in which a stop is closed."""
-    panels, rows = np.flatnonzero(motion.record.kind >= 0), motion.flow.round_rows.get(stop, [stop])
-    return np.asarray(panels[motion.record.depth[panels][:, rows].any(axis=(1, 2))])
+    return np.flatnonzero(touching_pieces(motion, stop))
 
 
 def _round_measures(motion: Trajectory, ring: Slider, ends: Real) -> SliderMeasures:

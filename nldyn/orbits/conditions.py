@@ -793,5 +793,6 @@ def defined_by(kind: str, family: OrbitFamily, orbit: Orbit) -> tuple[OrbitFamil
             raise SystemModelError("a Neimark-Sacker point needs at least two modes")
         return family, Singular.of(kind, orbit)
     raise SystemModelError(
-        f"unknown kind of special point {shown(kind)}; there are: {', '.join(KINDS)}"
+        f"no defining system is known of {shown(kind)} points; there are those of: "
+        f"{', '.join(KINDS)}"
     )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from nldyn.bifurcations.self_excited import GRAZING_SLIDING
+from nldyn.bifurcations.kinds import GRAZING_SLIDING
 from nldyn.branches.endings import Ending
 from nldyn.plot.diagram import are_limit_cycles, branch_curve, stability_runs
 from nldyn.plot.words import FORCES, Along, unit_in

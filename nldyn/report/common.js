@@ -4,7 +4,7 @@ const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buff
 const stream = new Blob([bytes(find("data").textContent)]).stream().pipeThrough(new DecompressionStream("gzip"));
 const data = await new Response(stream).json();
 const floats = (text) => new Float32Array(bytes(text));
-const SYMBOLS = { LP: "circle-open", PD: "square-open", NS: "diamond-open", BP: "triangle-up-open", GR: "x-thin", "phase resonance": "cross-open", "amplitude antiresonance": "triangle-down-open" };
+const SYMBOLS = { LP: "circle-open", PD: "square-open", NS: "diamond-open", BP: "triangle-up-open", GR: "x-thin", CS: "triangle-left-open", GS: "pentagon-open", AS: "triangle-right-open", "phase resonance": "cross-open", "amplitude antiresonance": "triangle-down-open" };
 const BLUE = "#0072B2", ORANGE = "#D55E00", GREY = "#555";
 const PALETTE = [ORANGE, "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5D4E9C"];
 const FONT = { family: 'system-ui, "DejaVu Sans", sans-serif', size: 12, color: "#202020" };

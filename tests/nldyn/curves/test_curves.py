@@ -847,7 +847,7 @@ WINDOW = ((20.0, 30.0), (-1e-6, 1e-6))
             lambda o: continue_special(
                 SimpleNamespace(kind="CP", orbit=o), ("frequency_hz", "gap"), WINDOW
             ),
-            "unknown kind of special point 'CP'; there are: LP, PD, NS, BP, GR",
+            "no defining system is known of 'CP' points; there are those of: LP, PD, NS, BP, GR",
         ),
         (
             lambda o: refine_special(SimpleNamespace(kind="NS", orbit=o)),

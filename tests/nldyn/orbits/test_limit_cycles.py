@@ -132,7 +132,7 @@ def test_a_branch_over_the_speed_of_the_belt_follows_the_frequency(family):
 
 def test_sticking_is_lost_where_the_slowest_slip_is_zero_and_the_branch_turns(family):
     lost = family.special_points[0]
-    assert lost.kind == "grazing-sliding"
+    assert lost.kind == "GS"
 
     def fastest(speed):
         """Top speed in the swing from where it slips, as if nothing stuck, beside the belt's."""
@@ -248,7 +248,7 @@ def test_a_branch_is_saved_goes_on_after_an_interruption_and_is_extended(tmp_pat
     assert back.name == "cycles"
     assert back.values.tolist() == whole.values.tolist()
     assert back.frequency_hz.tolist() == whole.frequency_hz.tolist()
-    assert [mark.kind for mark in back.special_points] == ["grazing-sliding"]
+    assert [mark.kind for mark in back.special_points] == ["GS"]
     assert len(back.requested) == len(whole.requested) == 2
     kept = CheckpointFile(tmp_path / "kept.h5")
     short = continue_branch(start, (0.45, 0.54), parameter="base_speed", checkpoint=kept)

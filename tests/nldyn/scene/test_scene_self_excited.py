@@ -127,7 +127,7 @@ def test_the_example_finds_the_hopf_point_where_friction_falls_as_fast_as_dampin
     scene = load_scene(example("block_on_a_belt.toml"))
     (branch,) = compute(scene).branches
     sliding, hopf = branch.special_points
-    assert (sliding.kind, hopf.kind) == ("grazing-sliding", "Hopf")
+    assert (sliding.kind, hopf.kind) == ("GS", "Hopf")
     assert hopf.value == pytest.approx(0.05 * math.log(0.1 / 0.05 / 0.04), rel=1e-5)
     assert [orbit.stable for orbit in branch.at(0.4)] == [True, False]
 
