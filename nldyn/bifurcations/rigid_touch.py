@@ -165,9 +165,10 @@ class Touches:
             number = slider_of(flow.system, stop)
             if number is None:
                 continue
-            row, friction = len(flow.system.stops) + number, flow.system.sliders[number].friction
-            way = np.sign(flow.slips(number, state[None])[0, 0])
-            kick += way * friction.coefficient * flow.force_columns[:, row]
+            slip, rows = flow.slips(number, state[None])[0], flow.slider_rows(number)
+            size, friction = np.linalg.norm(slip), flow.system.sliders[number].friction
+            way = slip / size if size > 0.0 else slip
+            kick += friction.coefficient * flow.force_columns[:, rows] @ way
         if self.at.change is not None:
             kicks = kicks @ self.at.change[1].T
         return np.asarray(kicks / (self.rows[1] * kicks).sum(1)[:, None])

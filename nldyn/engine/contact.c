@@ -78,6 +78,26 @@ static void change_length(Motion *M, Trial *trial, int kind, double ratio)
     trial->h *= ratio;
 }
 
+/* Add to the rounding errors of the accelerations of what is held those of friction over a plane, which
+ * acts on them at once: its direction is as little known as a speed that comes to rest. */
+static void add_heading_noise(const Motion *M, double *rounding)
+{
+    const Flow *fl = M->fl;
+    const Panel *panel = M->panel;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!M->closed[s] || !is_hard_disc(fl, s) || is_mate(fl, s) || fl->slides[s] != 1) continue;
+        double speed[2], here = M->phase + fl->omega * M->t;
+        double least = (1.0 - NEARER) * speeds_over(fl, s, M->w, here, speed); /* at the end */
+        double force = grip(fl, s) * pressed_on(M, s) * speeds_noise(fl, s, M->w) / larger(least, TINY);
+        for (int a = 0; a < panel->na; a++) {
+            int held = panel->active[a];
+            if (is_held(fl, held))
+                rounding[a] += force * hypot(between(fl, held, s),
+                                             between(fl, held, (int)stop_of(fl, s)->beside));
+        }
+    }
+}
+
 /* rounding errors of the outputs, from which events are found in the state */
 static void fill_rounding(const Motion *M)
 {
@@ -93,6 +113,7 @@ static void fill_rounding(const Motion *M)
         int stop = panel->active[o % panel->na];
         rounding[o] = o < 2 * panel->na ? rate_noise(fl, stop, M->w) : pressing_noise(fl, stop, M->w);
     }
+    add_heading_noise(M, rounding);
     for (int o = 0; o < panel->outputs; o++) M->s->noise[o] = rounding[o];
 }
 

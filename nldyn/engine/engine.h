@@ -265,7 +265,7 @@ typedef struct {
     double *drags; /* (n_stops,) speeds of the places of sliders behind springs, see `drag_speed` */
     int *resting, *mobility_order;
     double *rate, *moved, *moved_shift, *along, *along_columns, *offsets;
-    double *closing, *sliding, *turning, *gained, *rubbed, *pull; /* strike, hold */
+    double *closing, *sliding, *aside, *turning, *gained, *pull; /* strike, hold */
     bool *struck, *still;
     bool *was_open; /* (n_stops,) before an event */
 } Scratch;

@@ -14,6 +14,8 @@
  * Without a spring the force is R v/|v|: there are no places, and no rows of these. */
 #include "engine.h"
 
+#define SETTLING 30 /* rounds in which a force and the way in which it lets go settle */
+
 enum { OF_NORMAL = 4, N_TILTS = 5 }; /* strains and speeds along both tangents, normal force */
 
 /* whether a slider slides over its plane */
@@ -329,13 +331,21 @@ static double slope_at_node(const Gauss *tab, const double *values, int i)
     return 2.0 * total;
 }
 
-/* Fill the direction u (2,) in which what rests over a plane leaves, by the accelerations a that it
- * would have without friction, and the most that this may be, R: (R B + σ) u = a with |u| = 1, so that
- * it gets faster, by σ, along the direction in which it goes. */
-static void fill_leaving(const Flow *fl, int s, const double *free, double most, double *u)
+/* fill how what slides over a plane yields to forces along both tangents: xx, xy, yy */
+static void fill_yield(const Flow *fl, int s, double *B)
 {
     int other = (int)stop_of(fl, s)->beside;
-    double b = stop_of(fl, s)->mobility, c = between(fl, s, other), d = stop_of(fl, other)->mobility;
+    B[0] = stop_of(fl, s)->mobility;
+    B[1] = between(fl, s, other);
+    B[2] = stop_of(fl, other)->mobility;
+}
+
+/* Fill the direction u (2,) in which what rests over a plane leaves, by how it yields, B, the
+ * accelerations a that it would have without friction, and the most that this may be, R:
+ * (R B + σ) u = a with |u| = 1, so that it gets faster, by σ, along the direction in which it goes; σ. */
+static double fill_leaving(const double *B, const double *free, double most, double *u)
+{
+    double b = B[0], c = B[1], d = B[2];
     double low = 0.0, high = hypot(free[0], free[1]), size = 0.0;
     for (int step = 0; step < 60; step++) {
         double more = 0.5 * (low + high), p = most * b + more, q = most * c, r = most * d + more;
@@ -349,6 +359,24 @@ static void fill_leaving(const Flow *fl, int s, const double *free, double most,
             high = more;
     }
     for (int i = 0; i < 2; i++) u[i] /= larger(size, TINY);
+    return 0.5 * (low + high);
+}
+
+/* The same of what a rigid stop presses on with a force N that friction changes at once: by the
+ * accelerations (3,) along the normal and both tangents without either; N. */
+static double fill_pressed_leaving(const Flow *fl, int s, const double *free, double N, double *u)
+{
+    int stop = (int)stop_of(fl, s)->normal;
+    double B[3], friction = stop_of(fl, s)->friction;
+    double both[2] = {between(fl, stop, s), between(fl, stop, (int)stop_of(fl, s)->beside)};
+    fill_yield(fl, s, B);
+    for (int round = 0; round < SETTLING; round++) {
+        double left[2] = {free[1] - both[0] * N, free[2] - both[1] * N}, before = N;
+        fill_leaving(B, left, friction * N, u);
+        N = larger(free[0] / (stop_of(fl, stop)->mobility + friction * (both[0] * u[0] + both[1] * u[1])), 0.0);
+        if (fabs(N - before) <= SUM_ROUNDING * N) break;
+    }
+    return N;
 }
 
 /* Guess the forces of what has just been let go over a plane, at a place among the closed ones, by
@@ -356,7 +384,11 @@ static void fill_leaving(const Flow *fl, int s, const double *free, double most,
 static void guess_leaving(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel, int a)
 {
     int na = panel->na, m = panel->m, first = panel->active[a], places[4];
+    int stop = is_pressed(fl, first) ? (int)stop_of(fl, first)->normal : -1;
+    bool rigid = stop >= 0 && is_rigid(fl, stop);
+    double B[3];
     disc_places(fl, panel, first, places);
+    fill_yield(fl, first, B);
     for (int i = 0; i < m; i++) {
         double free[2], u[2], normal = larger(normal_at(fl, panel, first, i), 0.0);
         for (int d = 0; d < 2; d++) {
@@ -366,7 +398,18 @@ static void guess_leaving(const Flow *fl, const Gauss *tab, int kind, double h, 
             for (int e = 0; e < 2; e++)
                 free[d] += between(fl, row, panel->active[places[e]]) * panel->F[places[e] * m + i];
         }
-        fill_leaving(fl, first, free, stop_of(fl, first)->friction * normal, u);
+        if (rigid) {
+            double all[3] = {stop_of(fl, stop)->mobility * normal, free[0], free[1]};
+            for (int d = 0; d < 2; d++) {
+                double both = between(fl, stop, panel->active[places[d]]);
+                all[0] += both * panel->F[places[d] * m + i];
+                all[1 + d] += both * normal;
+            }
+            normal = fill_pressed_leaving(fl, first, all, normal, u);
+            panel->F[place_of(panel, stop) * m + i] = normal;
+        } else {
+            fill_leaving(B, free, stop_of(fl, first)->friction * normal, u);
+        }
         for (int d = 0; d < 2; d++)
             panel->F[places[d] * m + i] = stop_of(fl, first)->friction * normal * u[d];
     }

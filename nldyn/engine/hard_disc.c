@@ -32,6 +32,13 @@ static double speeds_noise(const Flow *fl, int s, const double *w)
     return noise;
 }
 
+/* force that presses it on; s->stop_forces are filled */
+static double pressed_on(const Motion *M, int s)
+{
+    return is_pressed(M->fl, s) ? M->s->stop_forces[(int)stop_of(M->fl, s)->normal]
+                                : stop_of(M->fl, s)->pressing;
+}
+
 /* whether something is left of it now but rounding */
 static bool moves_over(const Motion *M, int s)
 {

@@ -66,11 +66,16 @@ static bool acts_at_once(const Flow *fl, const Panel *panel, int o, int a)
     return other != stop && other != partner_row(fl, stop);
 }
 
-/* whether a slider moves as another stop does */
+/* whether a slider moves as another stop does, over a plane in some direction of it */
 static bool moves_with(const Flow *fl, int slider, int stop)
 {
-    double both = stop_of(fl, slider)->mobility * stop_of(fl, stop)->mobility;
-    return squared(between(fl, slider, stop)) >= (1.0 - ALONG) * both;
+    double own = stop_of(fl, stop)->mobility, first = between(fl, slider, stop), B[3];
+    if (!is_disc(fl, slider))
+        return squared(first) >= (1.0 - ALONG) * own * stop_of(fl, slider)->mobility;
+    fill_yield(fl, slider, B);
+    double second = between(fl, (int)stop_of(fl, slider)->beside, stop);
+    double along = B[2] * first * first - 2.0 * B[1] * first * second + B[0] * second * second;
+    return along >= (1.0 - ALONG) * own * (B[0] * B[2] - B[1] * B[1]);
 }
 
 /* fill the rows of a block in to, rise and back, by its exponentials: there (4, m), back (4, m) and

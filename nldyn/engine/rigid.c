@@ -17,6 +17,8 @@
 #define SLOW 1e-7 /* share of the first speed below which impacts are no longer told apart */
 #define LOW 10.0 /* a body that would rebound no higher than this many roundings of the gap stays */
 #define SEIZED 1e-2 /* of a mobility: what is left of it as a force that rubs grows without bound */
+#define DIRECTIONS 180 /* of a plane, between which at most one way leaves */
+#define OVER 1e-6 /* of the accelerations: by which what leaves gets faster, if it does at all */
 #define HIT_AGAIN 1e-3 /* rad of the excitation, within which a body that pushes off hits again */
 
 /* fill the rigid stops on which a body rests, and the sliders that stick; how many */
@@ -46,16 +48,10 @@ static int sliding_with(const Motion *M, int stop)
     return slider >= 0 && M->closed[slider] && M->fl->slides[slider] != 0 ? slider : -1;
 }
 
-/* friction there per unit of its force, in the sense of sliding */
-static double rubbing_share(const Flow *fl, int slider)
-{
-    return slider < 0 ? 0.0 : fl->slides[slider] * grip(fl, slider);
-}
-
 /* rows that a force acts on together, and its shares in them */
 typedef struct {
-    int count, row[2];
-    double share[2];
+    int count, row[3];
+    double share[3];
 } RowsAlong;
 
 /* those of what is held: in a round clearance both directions, along the circle for its surface,
@@ -75,18 +71,29 @@ static RowsAlong holding_along(const Motion *M, int s)
     int slider = is_rigid(M->fl, s) ? sliding_with(M, s) : -1;
     RowsAlong along = held_along(M, s);
     if (slider < 0) return along;
-    double share = rubbing_share(M->fl, slider);
+    double most = grip(M->fl, slider), share = M->fl->slides[slider] * most;
+    if (is_disc(M->fl, slider)) {
+        int other = (int)stop_of(M->fl, slider)->beside;
+        const double *u = M->s->across;
+        return (RowsAlong){3, {s, slider, other}, {1.0, most * u[slider], most * u[other]}};
+    }
     if (!is_round(M->fl, s)) return (RowsAlong){2, {s, slider}, {1.0, share}};
     for (int d = 0; d < 2; d++) along.share[d] += share * M->s->across[along.row[d]];
     return along;
 }
 
 /* fill directions in round clearances: s->across (n_stops,) along the circle, s->outward to where the
- * body presses */
+ * body presses; and over planes s->across to where it slides */
 static void fill_directions(const Motion *M, double phase)
 {
     const Flow *fl = M->fl;
     for (int s = 0; s < fl->n_stops; s++) {
+        if (M->closed[s] && is_hard_disc(fl, s) && !is_mate(fl, s) && fl->slides[s] != 0) {
+            double u[2];
+            fill_heading(M, s, phase, u);
+            M->s->across[s] = u[0];
+            M->s->across[(int)stop_of(fl, s)->beside] = u[1];
+        }
         if (!is_second(fl, s)) continue;
         double place[2], speed[2], pace[2];
         int lead = (int)stop_of(fl, s)->lead;
@@ -132,8 +139,7 @@ static double held_on(const Motion *M, int s)
 {
     const Flow *fl = M->fl;
     const double *forces = M->s->stop_forces;
-    if (is_pressed(fl, s)) return forces[(int)stop_of(fl, s)->normal];
-    if (!is_second(fl, s)) return stop_of(fl, s)->pressing;
+    if (!is_second(fl, s)) return pressed_on(M, s);
     int lead = (int)stop_of(fl, s)->lead;
     double out = M->s->across[s] * forces[lead] - M->s->across[lead] * forces[s];
     return stop_of(fl, s)->sense * out;
@@ -368,22 +374,30 @@ static void push_state(Motion *M, int stop, double impulse, const double *by)
     for (int k = 0; k < fl->size; k++) M->w[k] -= push[k] * impulse;
 }
 
-/* speed at which what a rigid stop presses on slides, if beyond rounding */
-static double slip_at(const Motion *M, int slider, double phase)
+/* speed at which what a rigid stop presses on slides, if beyond rounding, over a plane along both
+ * tangents (2,) */
+static void fill_slip(const Motion *M, int slider, double phase, double *slip)
 {
     const Flow *fl = M->fl;
-    if (is_second(fl, slider)) {
-        double speed = round_slip(fl, slider, M->w, phase).value;
-        return fabs(speed) <= SHUT * round_slip_noise(fl, slider, M->w, phase) ? 0.0 : speed;
+    double size, noise;
+    slip[1] = 0.0;
+    if (is_disc(fl, slider)) {
+        size = speeds_over(fl, slider, M->w, phase, slip);
+        noise = speeds_noise(fl, slider, M->w);
+    } else if (is_second(fl, slider)) {
+        size = slip[0] = round_slip(fl, slider, M->w, phase).value;
+        noise = round_slip_noise(fl, slider, M->w, phase);
+    } else {
+        double belt = stop_of(fl, slider)->belt;
+        size = slip[0] = output_now(fl, slider, M->w, phase).first - belt;
+        noise = rate_noise(fl, slider, M->w) + SUM_ROUNDING * fabs(belt);
     }
-    double belt = stop_of(fl, slider)->belt;
-    double slip = output_now(fl, slider, M->w, phase).first - belt;
-    double noise = SHUT * (rate_noise(fl, slider, M->w) + SUM_ROUNDING * fabs(belt));
-    return fabs(slip) <= noise ? 0.0 : slip;
+    if (fabs(size) <= SHUT * noise) slip[0] = slip[1] = 0.0;
 }
 
 /* fill changes (n_columns,) of an impulse: by those of the speeds of closing and sliding, in s->closing
- * and s->sliding, of the restitution and the friction, and in a round clearance by its turn */
+ * and s->sliding, over a plane also s->aside, of the restitution and the friction, and in a round
+ * clearance by its turn */
 static void blow_columns(const Motion *M, int stop, int slider, Rubbing at, const Slopes *impulse,
                          double *by)
 {
@@ -399,6 +413,7 @@ static void blow_columns(const Motion *M, int stop, int slider, Rubbing at, cons
     for (int c = 0; c < M->n_columns; c++) {
         by[c] = s->closing[c] * slopes[BY_SPEED];
         if (slider >= 0) by[c] += s->sliding[c] * slopes[BY_SLIP];
+        if (slider >= 0 && is_disc(fl, slider)) by[c] += s->aside[c] * slopes[BY_SLIP_ASIDE];
         if (turn != 0.0) by[c] += s->turning[c] * turn;
     }
     for (int c = 0; c < fl->n_parameters; c++) {
@@ -433,32 +448,52 @@ static void turn_impulses(Motion *M, int stop, double normal, double tangent)
     }
 }
 
+/* the impulses of an impact; those of friction are along one tangent, or both of a plane */
+static Blow blow_of(Motion *M, int stop, int slider, double speed, Value restitution, double phase,
+                    Rubbing *at)
+{
+    const Flow *fl = M->fl;
+    RowsAlong normal = held_along(M, stop);
+    *at = (Rubbing){taken_along(fl, normal, normal), 0.0, 1.0, 0.0};
+    if (slider < 0) return blow(*at, restitution, speed, 0.0);
+    double slip[2];
+    RowsAlong tangent = held_along(M, slider);
+    fill_slip(M, slider, phase, slip);
+    *at = (Rubbing){at->normal, taken_along(fl, normal, tangent), taken_along(fl, tangent, tangent),
+                    grip(fl, slider)};
+    if (!is_disc(fl, slider)) return blow(*at, restitution, speed, slip[0]);
+    int other = (int)stop_of(fl, slider)->beside;
+    Plane plane = {at->normal, {at->both, between(fl, stop, other)},
+                   {at->tangent, between(fl, slider, other), stop_of(fl, other)->mobility}, at->friction};
+    Blow found = blow_over(plane, restitution, speed, slip);
+    if (!isfinite(found.normal.value)) M->undecided = stop;
+    return found;
+}
+
 /* one impact: the impulses on the state, and its sensitivities */
 static void strike(Motion *M, int stop, double speed, Value restitution, double phase, double t,
                    const double *shift)
 {
     const Flow *fl = M->fl;
     Scratch *s = M->s;
-    int slider = rubbed_by(fl, stop);
-    RowsAlong normal = held_along(M, stop), tangent = normal;
-    Rubbing at = {taken_along(fl, normal, normal), 0.0, 1.0, 0.0};
-    if (slider >= 0) {
-        tangent = held_along(M, slider);
-        at = (Rubbing){at.normal, taken_along(fl, normal, tangent),
-                       taken_along(fl, tangent, tangent), grip(fl, slider)};
+    Rubbing at;
+    int slider = rubbed_by(fl, stop), other = slider >= 0 ? (int)stop_of(fl, slider)->beside : -1;
+    Blow hit = blow_of(M, stop, slider, speed, restitution, phase, &at);
+    if (M->undecided >= 0) return;
+    int rows[3] = {stop, slider, other};
+    const Slopes *impulses[3] = {&hit.normal, &hit.tangent, &hit.aside};
+    double *speeds[3] = {s->closing, s->sliding, s->aside};
+    for (int d = 0; d < 3 && M->with_columns; d++)
+        if (rows[d] >= 0) held_columns(M, rows[d], phase, t, shift, speeds[d]);
+    if (M->with_columns && is_round(fl, stop)) {
+        direction_columns(M, stop, phase, t, shift, s->turning);
+        turn_impulses(M, stop, hit.normal.value, hit.tangent.value);
     }
-    Blow hit = blow(at, restitution, speed, slider < 0 ? 0.0 : slip_at(M, slider, phase));
-    double *changed[2] = {s->gained, s->rubbed};
-    if (M->with_columns) {
-        held_columns(M, stop, phase, t, shift, s->closing);
-        if (slider >= 0) held_columns(M, slider, phase, t, shift, s->sliding);
-        if (is_round(fl, stop)) direction_columns(M, stop, phase, t, shift, s->turning);
-        blow_columns(M, stop, slider, at, &hit.normal, changed[0]);
-        blow_columns(M, stop, slider, at, &hit.tangent, changed[1]);
-        if (is_round(fl, stop)) turn_impulses(M, stop, hit.normal.value, hit.tangent.value);
+    for (int d = 0; d < 3; d++) {
+        if (rows[d] < 0) continue;
+        if (M->with_columns) blow_columns(M, stop, slider, at, impulses[d], s->gained);
+        push_rows(M, held_along(M, rows[d]), impulses[d]->value, s->gained);
     }
-    push_rows(M, normal, hit.normal.value, changed[0]);
-    if (slider >= 0) push_rows(M, tangent, hit.tangent.value, changed[1]);
 }
 
 /* fill s->offsets (count, 1 + n): gaps (rate 0) of the `resting` stops or the rates, and their
@@ -567,7 +602,7 @@ static void hand_over_sliders(const Motion *M, double phase, double roundings)
             acts = M->closed[(int)stop_of(fl, s)->lead];
         } else { /* what is held still slides on a belt */
             acts = !is_pressed(fl, s) || M->closed[(int)stop_of(fl, s)->normal];
-            acts = acts && (stop_of(fl, s)->belt != 0.0 || !holds_slider(M, s));
+            acts = acts && (stop_of(fl, s)->belt != 0.0 || is_disc(fl, s) || !holds_slider(M, s));
         }
         if (acts == M->closed[s]) continue;
         M->closed[s] = acts;
@@ -599,8 +634,102 @@ static double held_size(const Motion *M, int s)
                              : fabs(force);
 }
 
+/* Fill the accelerations (3,) along the normal and both tangents of what sticks on a rigid stop that it
+ * would have without its forces, and what these take there, yields (3, 3), with all else held as now;
+ * s->stop_forces are filled. */
+static void fill_contact(const Motion *M, const int *rows, double *free, double *yields)
+{
+    Scratch *s = M->s;
+    int n = held_stops(M, true), order[3];
+    double inverse[9];
+    factor_mobilities(M, n);
+    for (int c = 0; c < 3; c++) {
+        for (int a = 0; a < n; a++) s->held[a] = s->resting[a] == rows[c];
+        lu_apply_vector(s->mobility, n, s->mobility_order, s->held);
+        for (int a = 0; a < n; a++)
+            for (int r = 0; r < 3; r++)
+                if (s->resting[a] == rows[r]) inverse[3 * c + r] = s->held[a];
+    }
+    lu_factor(inverse, 3, order);
+    for (int i = 0; i < 9; i++) yields[i] = i % 4 == 0;
+    lu_apply(inverse, 3, order, yields, 3);
+    for (int r = 0; r < 3; r++) {
+        free[r] = 0.0;
+        for (int c = 0; c < 3; c++) free[r] += yields[3 * r + c] * s->stop_forces[rows[c]];
+    }
+}
+
+/* of a direction at an angle: what it is pulled aside by, times `lost`; what it gets faster by, likewise;
+ * and lost, the acceleration towards the stop that a unit of its force takes */
+static double pulled_aside(const double *free, const double *yields, double friction, double angle,
+                           double *faster, double *lost)
+{
+    double u[2] = {cos(angle), sin(angle)}, left[2];
+    *lost = yields[0] + friction * (yields[1] * u[0] + yields[2] * u[1]);
+    for (int d = 0; d < 2; d++) {
+        const double *row = yields + 3 * (1 + d);
+        left[d] = free[1 + d] * *lost - free[0] * (row[0] + friction * (row[1] * u[0] + row[2] * u[1]));
+    }
+    *faster = u[0] * left[0] + u[1] * left[1];
+    return u[0] * left[1] - u[1] * left[0];
+}
+
+/* Ways in which what sticks on a rigid stop may leave over its plane. */
+typedef struct {
+    int count;      /* of those along which it gets faster by more than rounding */
+    double u[2];    /* the direction of that along which it gets fastest */
+    double pressed; /* acceleration towards the stop that it would have without its forces */
+} Leaving;
+
+/* With the accelerations a_n, a without its forces it goes along u with the force N of the stop where
+ *
+ *     (m_nn + μ m_nt . u) N = a_n > 0,    a - m_tn N - μ N B u = σ u,    σ > 0
+ *
+ * so along zeros of a trigonometric polynomial of order two. */
+static Leaving ways_to_leave(const Motion *M, int stop, int slider)
+{
+    const Flow *fl = M->fl;
+    int rows[3] = {stop, slider, (int)stop_of(fl, slider)->beside};
+    double free[3], W[9], friction = grip(fl, slider), before = 0.0, best = -INFINITY;
+    fill_contact(M, rows, free, W);
+    Leaving found = {0, {0.0, 0.0}, free[0]};
+    double least = OVER * (fabs(free[0]) + hypot(free[1], free[2]));
+    for (int k = 0; k <= DIRECTIONS; k++) {
+        double low = 2.0 * PI * (k - 1) / DIRECTIONS, high = 2.0 * PI * k / DIRECTIONS, faster, lost;
+        double aside = pulled_aside(free, W, friction, high, &faster, &lost);
+        bool turns = k > 0 && (aside > 0.0) != (before > 0.0), rises = before > 0.0;
+        before = aside;
+        if (!turns) continue;
+        for (int round = 0; round < 60; round++) {
+            double middle = 0.5 * (low + high);
+            if ((pulled_aside(free, W, friction, middle, &faster, &lost) > 0.0) == rises)
+                low = middle;
+            else
+                high = middle;
+        }
+        pulled_aside(free, W, friction, high, &faster, &lost);
+        if (!(free[0] * lost > 0.0) || faster / lost < -least) continue;
+        if (faster / lost > least) found.count++;
+        if (!(faster / lost > best)) continue;
+        best = faster / lost;
+        found.u[0] = cos(high);
+        found.u[1] = sin(high);
+    }
+    return found;
+}
+
+/* let what a rigid stop presses on slide over its plane, along the one way in which it leaves; where
+ * there are several, or none though it is pressed on, that is told */
+static void fill_way_off(Motion *M, int stop, int slider, double *u)
+{
+    Leaving way = ways_to_leave(M, stop, slider);
+    bool none = way.u[0] == 0.0 && way.u[1] == 0.0;
+    if (way.count > 1 || (none && way.pressed > 0.0)) M->undecided = stop;
+    if (!none) memcpy(u, way.u, sizeof way.u);
+}
+
 /* let a slider go that sticks; s->stop_forces are filled */
-static void let_go(const Motion *M, int s)
+static void let_go(Motion *M, int s)
 {
     const Flow *fl = M->fl;
     M->panel->na = -1;
@@ -608,20 +737,22 @@ static void let_go(const Motion *M, int s)
         fl->slides[s] = held_force(M, s) > 0.0 ? 1 : -1;
         return;
     }
+    int other = (int)stop_of(fl, s)->beside, stop = (int)stop_of(fl, s)->normal;
+    if (!is_sprung(fl, s)) {
+        double held[2] = {held_force(M, s), held_force(M, other)}, B[3], free[2], u[2];
+        fill_yield(fl, s, B);
+        for (int d = 0; d < 2; d++) free[d] = B[2 * d] * held[d] + B[1] * held[1 - d];
+        fill_leaving(B, free, grip(fl, s) * larger(held_on(M, s), 0.0), u);
+        if (stop >= 0 && is_rigid(fl, stop)) fill_way_off(M, stop, s, u);
+        M->s->heading[s] = u[0];
+        M->s->heading[other] = u[1];
+    }
     set_slides(fl, s, is_sprung(fl, s) ? 1 : LET_GO);
-    if (is_sprung(fl, s)) return;
-    int other = (int)stop_of(fl, s)->beside;
-    double held[2] = {held_force(M, s), held_force(M, other)}, both = between(fl, s, other), u[2];
-    double free[2] = {stop_of(fl, s)->mobility * held[0] + both * held[1],
-                      stop_of(fl, other)->mobility * held[1] + both * held[0]};
-    fill_leaving(fl, s, free, grip(fl, s) * larger(held_on(M, s), 0.0), u);
-    M->s->heading[s] = u[0];
-    M->s->heading[other] = u[1];
 }
 
 /* let sliders slide that would need more than their friction to stick, the most loaded first; all, or
  * those alone that rigid stops press on */
-static void slip_of(const Motion *M, double phase, bool all)
+static void slip_of(Motion *M, double phase, bool all)
 {
     const Flow *fl = M->fl;
     for (int round = 0; round < fl->n_stops; round++) {
@@ -643,9 +774,9 @@ static void slip_of(const Motion *M, double phase, bool all)
     }
 }
 
-static void slip_overloaded(const Motion *M, double phase) { slip_of(M, phase, true); }
+static void slip_overloaded(Motion *M, double phase) { slip_of(M, phase, true); }
 
-static void slip_pressed(const Motion *M, double phase) { slip_of(M, phase, false); }
+static void slip_pressed(Motion *M, double phase) { slip_of(M, phase, false); }
 
 /* let what sticks at the start of a segment slip where it would need more than its friction */
 static void begin_sliders(Motion *M)
@@ -772,6 +903,19 @@ static bool may_jam(const Motion *M, int stop)
     return taken_along(M->fl, normal, normal) <= grip(M->fl, slider) * both;
 }
 
+/* look for a rigid stop that holds what sticks over a plane, too, in some direction of it: how much of
+ * that each takes is not told */
+static void find_cornered(Motion *M)
+{
+    const Flow *fl = M->fl;
+    for (int s = 0; s < fl->n_stops; s++) {
+        if (!is_stuck(M, s) || !is_disc(fl, s) || is_mate(fl, s)) continue;
+        for (int r = 0; r < fl->n_stops; r++)
+            if (is_rigid(fl, r) && !is_round(fl, r) && M->closed[r] && moves_with(fl, s, r))
+                M->undecided = r;
+    }
+}
+
 /* Look for a rigid stop whose force nothing tells, or more than one, with friction: where the forces
  * that hold the gaps would have to feed what closes them [Painlevé 1895; Génot and Brogliato 1999].
  * Elsewhere the leading minors of the matrix of their equations are positive, as without friction. */
@@ -779,6 +923,8 @@ static void find_undecided(Motion *M)
 {
     Scratch *s = M->s;
     int slid_on = -1;
+    find_cornered(M);
+    if (M->undecided >= 0) return;
     for (int r = 0; r < M->fl->n_stops; r++)
         if (M->closed[r] && sliding_with(M, r) >= 0) slid_on = r;
     int n = slid_on >= 0 ? held_stops(M, true) : 0;
@@ -796,13 +942,13 @@ static void find_undecided(Motion *M)
     }
 }
 
-/* The same of a rigid round clearance whose force has grown without bound: as the body goes round,
- * its friction comes to take as much from what it holds as it gives. */
+/* The same of a rigid stop whose force has grown without bound: as the body goes round in a clearance, or
+ * turns over a plane, its friction comes to take as much from what it holds as it gives. */
 static void find_seized(Motion *M, double phase)
 {
     fill_directions(M, phase);
     for (int r = 0; r < M->fl->n_stops; r++) {
-        if (!(is_rigid(M->fl, r) && M->closed[r] && is_round(M->fl, r))) continue;
+        if (!(is_rigid(M->fl, r) && M->closed[r])) continue;
         RowsAlong normal = held_along(M, r);
         if (sliding_with(M, r) >= 0 && held_by(M, r, r) <= SEIZED * taken_along(M->fl, normal, normal))
             M->undecided = r;
@@ -810,17 +956,26 @@ static void find_seized(Motion *M, double phase)
 }
 
 /* the same of a rigid stop that jams where nothing presses a body on: whether that holds or leaves
- * it is not told */
+ * it is not told; and over a plane where it may as well slide */
 static void find_jammed(Motion *M, double phase)
 {
     const Flow *fl = M->fl;
     for (int r = 0; r < fl->n_stops; r++) {
-        if (!(is_rigid(fl, r) && M->closed[r] && may_jam(M, r))) continue;
+        if (!(is_rigid(fl, r) && M->closed[r])) continue;
         int slider = rubbed_by(fl, r);
+        if (slider >= 0 && is_disc(fl, slider)) {
+            if (!is_stuck(M, slider) || !(held_force(M, r) > 0.0)) continue;
+            Leaving way = ways_to_leave(M, r, slider);
+            if (way.pressed <= 0.0 || way.count > 0) M->undecided = r;
+            continue;
+        }
+        if (!may_jam(M, r)) continue;
         RowsAlong normal = held_along(M, r);
         double pressed = taken_along(fl, normal, normal) * held_force(M, r) +
                          taken_along(fl, normal, held_along(M, slider)) * held_force(M, slider);
-        if (pressed <= 0.0 && slip_at(M, slider, phase) == 0.0) M->undecided = r;
+        double slip[2];
+        fill_slip(M, slider, phase, slip);
+        if (pressed <= 0.0 && slip[0] == 0.0) M->undecided = r;
     }
 }
 
@@ -916,6 +1071,7 @@ static void impact(Motion *M, int first, bool crossed, double phase, double t)
         if (step > ROUNDS || is_low(M, hit, restitution.value * speed, pushes[hit]))
             restitution = (Value){0.0, 0.0};
         strike(M, hit, speed, restitution, phase, t, shift);
+        if (M->undecided >= 0) return;
         struck[hit] = true;
         still[hit] = restitution.value == 0.0;
         leave_parting(M, phase, still);

@@ -19,16 +19,19 @@ typedef struct {
     double normal, both, tangent, friction;
 } Rubbing;
 
-enum BlowBy { BY_SPEED, BY_SLIP, BY_RESTITUTION, BY_FRICTION, BY_NORMAL, BY_BOTH, BY_TANGENT, N_BLOW_BY };
+enum BlowBy {
+    BY_SPEED, BY_SLIP, BY_SLIP_ASIDE, BY_RESTITUTION, BY_FRICTION, BY_NORMAL, BY_BOTH, BY_TANGENT,
+    N_BLOW_BY
+};
 
 /* a number and its derivatives by these */
 typedef struct {
     double value, by[N_BLOW_BY];
 } Slopes;
 
-/* impulses along the normal and the tangent */
+/* impulses along the normal and the tangent; over a plane along both tangents */
 typedef struct {
-    Slopes normal, tangent;
+    Slopes normal, tangent, aside;
 } Blow;
 
 static Slopes number_by(double value, int place, double slope)
@@ -100,5 +103,5 @@ static Blow blow(Rubbing at, Value restitution, double speed, double slip)
     bool turns = impulse.value > turn.value;
     Slopes rubbed = multiplied(turns ? behind : share, impulse);
     if (turns) rubbed = plus(rubbed, 1.0, multiplied(plus(share, -1.0, behind), turn));
-    return (Blow){impulse, rubbed};
+    return (Blow){impulse, rubbed, {0.0, {0.0}}};
 }

@@ -151,6 +151,10 @@ static void pass_event(Motion *M, int event, double h)
     }
     switch_with(M, here, M->t, h, M->s->was_open);
     if (M->undecided < 0) find_undecided(M);
+    if (M->undecided < 0 && is_hard_disc(M->fl, event)) {
+        contact_forces(M, here);
+        find_jammed(M, here);
+    }
     if (!any_sprung(M->fl)) return;
     contact_forces(M, here);
     load_springs(M, here, M->t, SHUT, 10.0 * coarsest_instant(M->fl) * h, event);
@@ -310,7 +314,7 @@ static int touch(Motion *M, double here, int na)
     carry_depths(M, here);
     Trial trial;
     status = contact_panel(M, here, h_max, &trial);
-    if (status == CONTACT_FAILED && panel->round) find_seized(M, here);
+    if (status == CONTACT_FAILED) find_seized(M, here);
     if (M->undecided >= 0) return UNDECIDED;
     if (status != OK) return status;
     if (M->bonded && trial.h > 0.0) {

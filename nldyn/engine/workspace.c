@@ -167,7 +167,7 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     s->sliding = numbers(block, n_columns);
     s->turning = numbers(block, n_columns);
     s->gained = numbers(block, n_columns);
-    s->rubbed = numbers(block, n_columns);
+    s->aside = numbers(block, n_columns);
     s->pull = numbers(block, size);
     s->offsets = numbers(block, na * (1 + n_columns));
     s->struck = flags(block, na);

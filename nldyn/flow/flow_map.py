@@ -405,10 +405,14 @@ class FlowMap:
         """Rows of the outputs' velocities in flight."""
         return self.system.linear.times_block(self.rows)
 
+    def slider_rows(self, number: int) -> list[int]:
+        """The outputs of a slider along its tangents."""
+        rows = self.plane_rows.get(number, [len(self.system.stops) + number])
+        return rows[: len(self.system.sliders[number].ends)]
+
     def slips(self, number: int, states: Real) -> Real:
         """Speeds (k, 1), over a plane (k, 2), of a slider on what it slides on, at states z."""
-        slider = self.system.sliders[number]
-        rows = self.plane_rows.get(number, [len(self.system.stops) + number])[: len(slider.ends)]
+        slider, rows = self.system.sliders[number], self.slider_rows(number)
         return np.asarray(
             states @ self.rate_rows[rows].T - slider.friction.base_speeds[: len(rows)]
         )

@@ -170,38 +170,45 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
         else:
             rates -= pushed[:, None] * flow.force_columns[:, i]
     first = len(system.stops)
-    rubs = np.zeros((len(phases), first))  # friction per unit of the force of a rigid stop
-    holds = np.zeros((len(phases), len(system.sliders)), dtype=bool)
-    for number, (*tangents, _, _) in flow.plane_rows.items():  # behind springs, beside rigid stops
-        slider = system.sliders[number]
-        pulled = (slider.tangential_stiffness or 0.0) * states @ flow.rows[tangents].T
+    tangents = [row for i in range(len(system.sliders)) for row in flow.slider_rows(i)]
+    rubs = {i: np.zeros((len(phases), len(tangents))) for i in rigid.tolist()}
+    holds = np.zeros((len(phases), len(tangents)), dtype=bool)
+    for number in set(system.sprung) & set(system.over_planes):
+        slider, own = system.sliders[number], flow.slider_rows(number)
+        pulled = (slider.tangential_stiffness or 0.0) * states @ flow.rows[own].T
         most = slider.friction.coefficient * _normal_force(flow, slider, states)
         size = np.hypot(pulled[:, 0], pulled[:, 1])
         share = np.minimum(1.0, most / np.where(size > 0.0, size, 1.0))
-        rates -= (share[:, None] * pulled) @ data.force[:, tangents].T
-    for i, slider in enumerate(system.sliders, first):
-        if i - first in system.over_planes:
+        rates -= (share[:, None] * pulled) @ data.force[:, own].T
+    for number, slider in enumerate(system.sliders):
+        if number in system.sprung and number in system.over_planes:
             continue
-        friction = rec.force[piece, i]
-        acts, sticks = friction.any(axis=1), held_in_pieces(motion, i - first)[piece]
-        holds[:, i - first] = acts & sticks
+        own = flow.slider_rows(number)
+        places = [tangents.index(row) for row in own]
+        friction = rec.force[piece][:, own]
+        acts, sticks = friction.any(axis=(1, 2)), held_in_pieces(motion, number)[piece]
+        holds[:, places] = (acts & sticks)[:, None]
+        if number in system.sprung:
+            most = slider.friction.coefficient * _normal_force(flow, slider, states)
+            pulled = (slider.tangential_stiffness or 0.0) * (states @ flow.rows[own[0]])
+            pulled = np.clip(pulled, -most, most)
+            rates -= pulled[:, None] * flow.force_columns[:, own[0]]
+            continue
+        slip = flow.slips(number, states)
+        size = np.linalg.norm(slip, axis=1)
+        way = np.sign(friction.sum(axis=2))  # along a line
+        if len(own) == 2:
+            way = slip / np.where(size > 0.0, size, 1.0)[:, None]
+        way *= np.where(acts & ~sticks, slider.friction.at(size), 0.0)[:, None]
         if slider.stop in system.rigid_stops:
-            way = np.sign(friction.sum(axis=1)) * slider.friction.coefficient
-            rubs[:, slider.stop] = np.where(acts & ~sticks, way, 0.0)
-            continue
-        normal = _normal_force(flow, slider, states)
-        if slider.tangential_stiffness is not None:
-            most = slider.friction.coefficient * normal
-            pulled = np.clip(slider.tangential_stiffness * (states @ flow.rows[i]), -most, most)
+            rubs[slider.stop][:, places] = way
         else:
-            speed = flow.slips(i - first, states)[:, 0]
-            law = np.sign(friction.sum(axis=1)) * slider.friction.at(speed)
-            pulled = np.where(sticks, 0.0, law) * normal
-        rates -= pulled[:, None] * flow.force_columns[:, i]
+            way *= _normal_force(flow, slider, states)[:, None]
+            rates -= way @ flow.force_columns[:, own].T
     for i, bond in enumerate(system.bonds, first + len(system.sliders)):
         pulled = bond.force(states @ flow.rows[i], states @ flow.rate_rows[i])
         rates -= pulled[:, None] * flow.force_columns[:, i]
-    acting = np.r_[rigid, first : first + len(system.sliders)]
+    acting = np.r_[rigid, np.array(tangents, dtype=np.intp)]
     rows = flow.rate_rows[acting]
     pace = states @ data.rows[2, acting].T + rates @ rows.T
     for k in resting.tolist():
@@ -218,10 +225,9 @@ def rest_forces(motion: Trajectory, phases: Real, states: Real) -> Real:
         columns = flow.force_columns[:, acting]
         pushed = np.column_stack([columns, *(column for _, column, _ in more)])
         taken = np.vstack([rows, *(row for row, _, _ in more)]) @ pushed
-        for i, slider in enumerate(system.sliders):
-            if slider.stop in system.rigid_stops:
-                place = int(np.searchsorted(rigid, slider.stop))
-                taken[:, place] += rubs[k, slider.stop] * taken[:, rigid.size + i]
+        along = taken[:, rigid.size : acting.size].copy()
+        for place, stop in enumerate(rigid.tolist()):
+            taken[:, place] += along @ rubs[stop][k]
         paces = np.r_[pace[k], [each for _, _, each in more]]
         found = np.linalg.solve(taken[np.ix_(held, held)], paces[held])
         forces[k, rigid[held[held < rigid.size]]] = found[held < rigid.size]

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from nldyn.base.arrays import Real
 from nldyn.flow.flow_map import FlowMap, Trajectory
@@ -15,6 +17,7 @@ from nldyn.system.system import System
 SHUT = 1e-13  # of the displacements that add up to that at a stop: a gap counts as closed
 STILL = 1e-9  # of the largest speed at a stop: one that counts as none
 ROUNDED = 1e-9  # of the slip before an impact: one behind it that is none
+GONE = 1e-12  # the same over a plane, in an impact: nothing slides on
 
 
 class Course(NamedTuple):
@@ -22,9 +25,11 @@ class Course(NamedTuple):
 
     Parameters
     ----------
-    depth, closing, slip : (k,)
-        Penetration in m, its rate, and the speed of sliding in m/s, which is zero without friction.
-    mobility : (k, 2, 2)
+    depth, closing : (k,)
+        Penetration in m, and its rate.
+    slip : (k, d)
+        Speeds of sliding in m/s along each tangent, without friction one that is zero.
+    mobility : (k, 1 + d, 1 + d)
         Speeds of closing and sliding that unit impulses along the normal and of friction take.
     """
 
@@ -37,18 +42,18 @@ class Course(NamedTuple):
 def course(flow: FlowMap, stop: int, states: Real) -> Course:
     """What states z (k, 2n) tell of a rigid stop."""
     depth, closing = flow.system.depth_and_speed(flow.system.stops[stop], flow.to_modal(states))
-    ring, slip = flow.system.round_stops.get(stop), np.zeros(len(states))
+    ring, slip = flow.system.round_stops.get(stop), np.zeros((len(states), 1))
     if ring is not None:
         at = flow.system.round_polar(ring, flow.to_modal(states))
         ways = np.stack([ring.sense * at.normal, at.across], axis=1)
         mobility = ways @ flow.mobility(flow.round_rows[stop]) @ np.swapaxes(ways, 1, 2)
-        return Course(depth, closing, at.sliding if ring.friction else slip, mobility)
+        return Course(depth, closing, at.sliding[:, None] if ring.friction else slip, mobility)
     number = slider_of(flow.system, stop)
     rows = [stop, stop]
     if number is not None:
-        rows[1] = len(flow.system.stops) + number
-        slip = flow.slips(number, states)[:, 0]
-    mobility = np.broadcast_to(flow.mobility(rows), (len(states), 2, 2))
+        rows = [stop, *flow.slider_rows(number)]
+        slip = flow.slips(number, states)
+    mobility = np.broadcast_to(flow.mobility(rows), (len(states), len(rows), len(rows)))
     return Course(depth, closing, slip, np.asarray(mobility))
 
 
@@ -73,11 +78,11 @@ class RigidImpacts(NamedTuple):
         Speeds in m/s at which the gap closes before, and opens after.
     impulse : (k,)
         Impulses in N s along the normal.
-    rub : (k,)
-        Those of friction, in the sense in which `slip` counts; zero without any.
-    slip, slip_behind : (k,)
+    rub : (k, d)
+        Those of friction along each tangent, in the sense in which `slip` counts; zero without any.
+    slip, slip_behind : (k, d)
         Speeds in m/s of sliding before and after; zero without friction.
-    mobility : (k, 2, 2)
+    mobility : (k, 1 + d, 1 + d)
         As of a `Course`.
     """
 
@@ -94,8 +99,8 @@ class RigidImpacts(NamedTuple):
     @property
     def loss(self) -> Real:
         """Energies (k,) in J that impacts take: an impulse times the mean speed along it."""
-        along = 0.5 * self.rub * (self.slip + self.slip_behind)
-        return 0.5 * self.impulse * (self.speed - self.rebound) + along
+        along = 0.5 * (self.rub * (self.slip + self.slip_behind)).sum(axis=1)
+        return np.asarray(0.5 * self.impulse * (self.speed - self.rebound) + along)
 
 
 def states_before(motion: Trajectory, pieces: NDArray[np.intp]) -> Real:
@@ -114,9 +119,9 @@ def rigid_impacts(motion: Trajectory, stop: int) -> RigidImpacts:
     flow, rec = motion.flow, motion.record
     after = 1 + np.flatnonzero(np.isin(rec.event[:-1], list(flow.system.rigid_stops)))
     if not after.size:
-        none = np.empty(0)
+        none, sides = np.empty(0), np.empty((0, 1))
         return RigidImpacts(
-            after, none, none, none, none, none, none, none, np.empty((0, 2, 2))
+            after, none, none, none, none, sides, sides, sides, np.empty((0, 2, 2))
         )
     before, behind = (
         course(flow, stop, states) for states in (states_before(motion, after), rec.start[after])
@@ -148,23 +153,24 @@ def slider_of(system: System, stop: int) -> int | None:
 def _impulses(
     coefficient: float | None, before: Course, behind: Course
 ) -> tuple[Real, Real, Real, Real]:
-    """Impulses (k,) along the normal and of friction, and speeds (k,) of sliding at both ends."""
+    """Impulses (k,) along the normal and (k, d) of friction, and speeds of sliding at both ends."""
     jump = before.closing - behind.closing
     if coefficient is None:
-        none = np.zeros(jump.shape)
+        none = np.zeros((jump.size, 1))
         return jump / before.mobility[:, 0, 0], none, none, none
-    jumps = np.stack([jump, before.slip - behind.slip], axis=1)
-    impulse, rub = np.linalg.solve(before.mobility, jumps[:, :, None])[:, :, 0].T
-    return impulse, rub, before.slip, behind.slip
+    jumps = np.column_stack([jump, before.slip - behind.slip])
+    found: Real = np.linalg.solve(before.mobility, jumps[:, :, None])[:, :, 0].astype(float)
+    return found[:, 0], found[:, 1:], before.slip, behind.slip
 
 
 def _turns(coefficient: float, hits: RigidImpacts) -> Real:
     """Normal impulses (k,) in N s at which sliding comes to rest or turns, or those at the end."""
     both, along = hits.mobility[:, 1].T
-    sense = np.sign(hits.slip)
-    turns = sense * hits.slip_behind <= ROUNDED * np.abs(hits.slip)
+    slip, behind = hits.slip[:, 0], hits.slip_behind[:, 0]
+    sense = np.sign(slip)
+    turns = sense * behind <= ROUNDED * np.abs(slip)
     slowed = np.where(turns & (sense != 0.0), sense * both + coefficient * along, 1.0)
-    return np.where(turns, np.abs(hits.slip) / slowed, hits.impulse)
+    return np.where(turns, np.abs(slip) / slowed, hits.impulse)
 
 
 def rubbed(coefficient: float, hits: RigidImpacts) -> Real:
@@ -173,11 +179,73 @@ def rubbed(coefficient: float, hits: RigidImpacts) -> Real:
     Sliding slows to rest at an instant of the impact, if it does; then it sticks, or slides back
     ever faster. Times μ that is what friction takes.
     """
+    if hits.slip.shape[1] == 2:
+        return np.asarray(_over_plane(coefficient, hits, hits.impulse)[0])
     turn = _turns(coefficient, hits)
-    before, behind = np.abs(hits.slip), np.abs(hits.slip_behind)
+    before, behind = np.abs(hits.slip[:, 0]), np.abs(hits.slip_behind[:, 0])
     way = before * turn + behind * (hits.impulse - turn)
     way[turn == hits.impulse] += (behind * hits.impulse)[turn == hits.impulse]
     return 0.5 * way
+
+
+def _over_plane(coefficient: float, hits: RigidImpacts, ends: Real) -> Real:
+    """Integrals (2, k) of the speeds of sliding and closing over the impulse up to `ends`."""
+    each = zip(hits.mobility, hits.speed, hits.slip, ends, strict=True)
+    found = [_slid_and_done(coefficient, *one) for one in each]
+    return np.array(found, dtype=float).reshape(-1, 2).T
+
+
+def _slid_and_done(
+    coefficient: float, mobility: Real, speed: float, slip: Real, end: float
+) -> tuple[float, float]:
+    """Integrals of the speeds of sliding and closing in one impact, up to a normal impulse.
+
+    Along the hodograph of sliding u, by s with dP = |u| ds, see `nldyn/engine/plane_impact.c`. The
+    work along the normal is what the energy loses beside that of friction.
+    """
+    both, B, size = mobility[0, 1:], mobility[1:, 1:], float(np.hypot(*slip))
+
+    def rate(_: float, y: Real) -> Real:
+        fast = np.hypot(y[0], y[1])
+        return np.array([*(-fast * both - coefficient * B @ y[:2]), fast, fast * fast])
+
+    def left(_: float, y: Real) -> float:
+        return float(y[2]) - end
+
+    def gone(_: float, y: Real) -> float:
+        return float(np.hypot(y[0], y[1])) - GONE * size
+
+    left.terminal = gone.terminal = True  # type: ignore[attr-defined]
+    u, passed, slid = np.zeros(2), 0.0, 0.0
+    if size > 0.0:
+        run = solve_ivp(rate, (0.0, math.inf), [*slip, 0.0, 0.0], method="DOP853", rtol=1e-12,
+                        atol=1e-15 * size, events=[left, gone])  # fmt: skip
+        u, passed, slid = run.y[:2, -1], float(run.y[2, -1]), float(run.y[3, -1])
+        if np.hypot(*u) <= 2.0 * GONE * size:
+            u = np.zeros(2)
+    if passed < end and not np.any(u):
+        u = -(both + B @ _share_behind(coefficient, both, B)) * (end - passed)
+        slid += 0.5 * float(np.hypot(*u)) * (end - passed)
+    rub = np.linalg.solve(B, slip - u - both * end)
+    speeds = np.array([speed, *slip]), np.array([speed - mobility[0] @ [end, *rub], *u])
+    energies = [0.5 * float(v @ np.linalg.solve(mobility, v)) for v in speeds]
+    return slid, energies[0] - energies[1] - coefficient * slid
+
+
+def _share_behind(coefficient: float, both: Real, B: Real) -> Real:
+    """Friction (2,) per normal impulse from where nothing slides on: it sticks, or leaves."""
+    sticks = np.linalg.solve(B, -both)
+    if np.hypot(*sticks) <= coefficient:
+        return np.asarray(sticks)
+
+    def along(faster: float) -> Real:
+        return np.asarray(np.linalg.solve(coefficient * B + faster * np.eye(2), -both))
+
+    def excess(faster: float) -> float:
+        return float(np.hypot(*along(faster))) - 1.0
+
+    faster = float(brentq(excess, 0.0, 2.0 * float(np.hypot(*both))))
+    return np.asarray(coefficient * along(faster))
 
 
 def normal_losses(flow: FlowMap, stop: int, hits: RigidImpacts) -> Real:
@@ -194,8 +262,10 @@ def compression_works(flow: FlowMap, stop: int, hits: RigidImpacts) -> Real:
     work = 0.5 * ends * hits.speed
     if coefficient is None:
         return work
+    if hits.slip.shape[1] == 2:
+        return np.asarray(_over_plane(coefficient, hits, ends)[1])
     own, both = hits.mobility[:, 0].T
     turn = _turns(coefficient, hits)
-    share = np.sign(hits.slip) * coefficient
+    share = np.sign(hits.slip[:, 0]) * coefficient
     kink = hits.speed - (own + share * both) * turn
     return np.where(turn < ends, 0.5 * (turn * hits.speed + ends * kink), work)

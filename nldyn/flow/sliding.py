@@ -209,6 +209,9 @@ def _hard_plane_measures(motion: Trajectory, number: int, ends: Real) -> SliderM
     fine = rec.force[panels][:, rows] @ fine_table(flow.tables.nodes.size).T
     largest = peaks(np.hypot(*np.moveaxis(fine, 1, 0)))
     loss = float((force[slides] * way).sum())
+    if slider.stop in flow.system.rigid_stops:
+        pressed += (in_impacts := _rubbed_in_impacts(motion, slider))
+        loss += slider.friction.coefficient * in_impacts
     return _measures(motion, slider, largest, float(way.sum()), duration, slides, loss, pressed)
 
 

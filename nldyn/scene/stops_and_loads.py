@@ -80,13 +80,10 @@ def _rough(scene: Scene, stops: list[AnyStop]) -> tuple[AnyStop, ...]:
             raise scene_error(scene.file, ("friction", number, "stop"), fault)
         rough: dict[str, Any] = {"tangent": table.at, "tangent_against": table.against}
         rough["friction"] = table.of_coulomb
+        rough["second_tangent"] = table.second_tangent
+        rough["second_tangent_against"] = table.second_tangent_against
         if isinstance(stop, Stop):
             rough["tangential_stiffness"] = table.tangential_stiffness
-            rough["second_tangent"] = table.second_tangent
-            rough["second_tangent_against"] = table.second_tangent_against
-        elif table.second_tangent is not None:
-            fault = f"is not for stop {table.stop}, which is rigid and has no spring along a plane"
-            raise scene_error(scene.file, ("friction", number, "second_tangent"), fault)
         elif table.tangential_stiffness is not None:
             fault = f"is not for stop {table.stop}, which is rigid and has no spring along it"
             raise scene_error(scene.file, ("friction", number, "tangential_stiffness"), fault)

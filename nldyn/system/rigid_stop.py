@@ -9,9 +9,9 @@ from typing import ClassVar
 
 from nldyn.base.errors import SystemModelError, check_types, is_finite, shown
 from nldyn.system.contact_law import ContactLaw, numba_for
-from nldyn.system.friction import Friction, check_plane
+from nldyn.system.friction import Across, Friction, across_of, check_plane
 from nldyn.system.round_stop import RoundStop
-from nldyn.system.stop import Stop, check_tangent
+from nldyn.system.stop import Stop, check_other_side, check_tangent
 from nldyn.system.values import check_restitution, check_sides
 
 Restitution = Callable[[float], tuple[float, float]]
@@ -38,6 +38,9 @@ class RigidStop:
     normal and tangent are coupled. Where they are not, as at a block on a table, they agree.
     On the stop it sticks, or slides at μ times the force of rest. Where a large μ leaves no force
     or several (Painlevé), the flow map fails with a sentence that names the stop and the phase.
+    With a `second_tangent` it slides over the plane of both: friction is against its sliding there,
+    whose direction turns in an impact where the masses along both, or normal and tangents, differ
+    or are coupled.
 
     Parameters
     ----------
@@ -57,6 +60,8 @@ class RigidStop:
         As for a `Stop`. The coefficient is one, at rest and sliding.
     area, share
         As for a `Stop`: of a point of an area of contact, which must have no mass.
+    second_tangent, second_tangent_against : str, optional
+        As for a `Stop`.
 
     Raises
     ------
@@ -68,8 +73,9 @@ class RigidStop:
     S. W. Shaw, P. J. Holmes (1983), *J. Sound Vib.* 90, 129-155; F. Pfeiffer, C. Glocker (1996),
     *Multibody Dynamics with Unilateral Contacts*, ch. 8. For friction E. J. Routh (1905), *Dynamics
     of a System of Rigid Bodies, Elementary Part*, ch. 4; T. R. Kane, D. A. Levinson (1985),
-    *Dynamics: Theory and Applications*; Y. Wang, M. T. Mason (1992), *J. Appl. Mech.* 59, 635-642;
-    F. Génot, B. Brogliato (1999), *Eur. J. Mech. A/Solids* 18, 653-677.
+    *Dynamics: Theory and Applications*; J. B. Keller (1986), *J. Appl. Mech.* 53, 1-4; W. J.
+    Stronge (2000), *Impact Mechanics*, ch. 4; Y. Wang, M. T. Mason (1992), *J. Appl. Mech.* 59,
+    635-642; F. Génot, B. Brogliato (1999), *Eur. J. Mech. A/Solids* 18, 653-677.
 
     Examples
     --------
@@ -87,6 +93,8 @@ class RigidStop:
     tangent_against: str | None = None
     area: str | None = None
     share: float = 1.0
+    second_tangent: str | None = None
+    second_tangent_against: str | None = None
     impulsive: ClassVar[bool] = True
     sharp: ClassVar[bool] = True
     jumps: ClassVar[bool] = True
@@ -108,9 +116,18 @@ class RigidStop:
         check_sides(owner, self.at, self.against, self.direction)
         ends = (self.tangent, self.tangent_against)
         law = check_tangent(owner, (self.at, self.against), ends, self.friction)
+        if law is None and self.across is not None:
+            raise SystemModelError(f"{owner}: friction needs both friction and tangent")
         if law is not None:
-            check_plane(owner, ends, None, law)
+            check_plane(owner, (self.at, self.against, *ends), self.across, law)
+            beside = self.second_tangent_against
+            check_other_side(owner, "second_tangent_against", beside, self.against)
         object.__setattr__(self, "friction", law)
+
+    @property
+    def across(self) -> Across:
+        """Ends of its second tangent, if it has one."""
+        return across_of(self.second_tangent, self.second_tangent_against)
 
     @property
     def reach(self) -> float:

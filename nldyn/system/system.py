@@ -1039,18 +1039,28 @@ class System:
                     f"friction at '{at}' acts on no motion: none of the {self.size} modes "
                     "moves there"
                 )
+        rings = any(isinstance(stop, RoundStop) for stop in self.rigid_stops.values())
         for number in self.over_planes:
-            slider = self.sliders[number]
-            if self.rigid_stops and number not in self.sprung:
+            slider, rigid = self.sliders[number], self.rigid_stops.get(self.sliders[number].stop)
+            if self.rigid_stops and number not in self.sprung and (rings or rigid is None):
                 raise SystemModelError(
                     f"friction at '{slider.at}' over a plane needs a tangential_stiffness beside "
-                    "rigid stops: what an impact makes of sliding over a plane is not told"
+                    "rigid stops that do not press on it: what their impacts make of the sliding "
+                    "is not told"
                 )
             if _one_motion(*(self.vector_between(*ends) for ends in slider.ends)):
                 raise SystemModelError(
                     f"friction at '{slider.at}' acts over no plane with '{slider.ends[1][0]}': in "
                     f"the {self.size} modes both tangents are one motion, or none"
                 )
+            if isinstance(rigid, RigidStop):
+                rows = [self.vector_between(*ends) for ends in slider.ends]
+                if _rank([self.stop_vector(rigid), *rows], self.size) < 3:
+                    raise SystemModelError(
+                        f"friction at '{slider.at}' acts over no plane along the rigid stop at "
+                        f"'{rigid.at}': in the {self.size} modes its normal is a motion of both "
+                        "tangents, so that nothing tells what holds it"
+                    )
         for stop in self.rigid_stops.values():
             if isinstance(stop, RoundStop):
                 self._check_rigid_ring(stop)

@@ -11,7 +11,6 @@ from nldyn import (
     FlowMap,
     HarmonicForce,
     Parameter,
-    RigidStop,
     Stop,
     System,
     SystemModelError,
@@ -203,23 +202,6 @@ def test_derivatives_by_numbers_are_those_of_differences(name):
     np.testing.assert_allclose(exact, slope, atol=1e-6 * np.abs(exact).max())
 
 
-@pytest.mark.parametrize(
-    ("make", "told"),
-    [
-        (
-            lambda: DryFriction("x", 1.0, Friction(0.3, 0.4, 0.1), second_tangent="y"),
-            "with a second_tangent has one coefficient",
-        ),
-        (
-            lambda: System.from_matrices(
-                np.eye(2), np.eye(2), {"x": [1.0, 0.0], "y": [0.0, 1.0]},
-                stops=[RigidStop("x", 0.5, 1.0)],
-                dampers=[DryFriction("x", 1.0, 0.3, second_tangent="y")],
-            ),
-            "needs a tangential_stiffness beside rigid stops",
-        ),
-    ],
-)  # fmt: skip
-def test_what_is_not_told_is_refused_in_a_sentence(make, told):
-    with pytest.raises(SystemModelError, match=told):
-        make()
+def test_a_coefficient_that_changes_is_refused_in_a_sentence():
+    with pytest.raises(SystemModelError, match="with a second_tangent has one coefficient"):
+        DryFriction("x", 1.0, Friction(0.3, 0.4, 0.1), second_tangent="y")

@@ -188,12 +188,21 @@ def test_a_second_tangent_makes_friction_over_a_plane(tmp_path):
     assert system.output("along") == 2 + 2 + 1 + system.interfaces.index("along")
 
 
+def test_what_slides_over_a_plane_on_a_rigid_stop_needs_no_spring(tmp_path):
+    hard = over_a_plane(stop=1).replace("tangential_stiffness = 20.0", "")
+    system = build_system(with_third(tmp_path, hard))
+    assert (system.stops[1].impulsive, system.stops[1].across) == (True, ("aside", None))
+    assert describe_slider(system.sliders[0]) == (
+        "friction at 'along', over the plane with 'aside': coefficient 0.3, pressed on by stop 1"
+    )
+
+
 @pytest.mark.parametrize(
     ("other", "told"),
     [
         (over_a_plane(second="nowhere"), r"friction\[1\]\.second_tangent.*nowhere"),
         (over_a_plane(second="along"), "another interface as 'second_tangent'"),
-        (over_a_plane(stop=1), "is not for stop 1, which is rigid"),
+        (over_a_plane(stop=1), "tangential_stiffness is not for stop 1, which is rigid"),
         (
             over_a_plane().replace("tangential_stiffness = 20.0", ""),
             "needs a tangential_stiffness beside rigid stops",
