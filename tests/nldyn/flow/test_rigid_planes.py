@@ -146,6 +146,57 @@ def drawn(seed, coupled=0.35):
     return system, body, omega, np.concatenate([np.zeros(n), rng.normal(size=n)])
 
 
+def two_at_once(link):
+    """Two pucks in bowls, shaken, and what links them; each is thrown on a floor of its own."""
+    K = np.kron(np.diag([1.0, 1.6]), np.diag([1.0, 1.3, 0.7])) + link * np.ones((6, 6))
+    M = np.kron(np.diag([1.0, 1.4]), np.array([[1.0, 0.1, 0.2], [0.1, 1.2, -0.2], [0.2, -0.2, 1.5]]))
+    names = ["x", "y", "z", "u", "v", "w"]
+    stops = [
+        RigidStop("z", 0.5, 0.05, -1, tangent="x", second_tangent="y", friction=0.4),
+        RigidStop("w", 0.3, 0.02, -1, tangent="u", second_tangent="v", friction=0.25),
+    ]
+    drive = [HarmonicForce(*each) for each in zip(names, [0.8, 0.6, 1.8] * 2, range(0, 360, 60), strict=True)]
+    pressed = [ConstantForce("z", -1.5), ConstantForce("w", -1.2)]
+    return System.from_matrices(
+        M, K, dict(zip(names, np.eye(6), strict=True)), damping=0.2 * K, stops=stops,
+        excitation=[*drive, *pressed],
+    ), M, K  # fmt: skip
+
+
+def test_two_stops_at_once_are_each_as_alone():
+    system, M, K = two_at_once(0.0)
+    start, phases = np.tile([0.1, 0.2, 0.3], 4), np.array([0.0, 4.0 * TURN])
+    flow = FlowMap(system)
+    found = flow.shoot(to_state(flow, start)[None], phases, 0.9)
+    assert found.failure == ""
+    end = from_state(flow, found.ends[0])
+    for i, names in enumerate((["x", "y", "z"], ["u", "v", "w"])):
+        part, own = slice(3 * i, 3 * i + 3), system.stops[i : i + 1]
+        alone = System.from_matrices(
+            M[part, part], K[part, part], dict(zip(names, np.eye(3), strict=True)),
+            damping=0.2 * K[part, part], stops=own,
+            excitation=[each for each in system.excitation if each.at in names],
+        )  # fmt: skip
+        expected = FlowMap(alone)
+        one = expected.shoot(to_state(expected, start[:6])[None], phases, 0.9)
+        both = end.reshape(2, 6)[:, part].ravel()
+        np.testing.assert_allclose(both, from_state(expected, one.ends[0]), atol=1e-9)
+        motion = flow.trajectory(to_state(flow, start)[None], phases, 0.9)
+        friction = slider_measures(motion)[i]
+        assert min(friction.stuck, friction.slid, friction.open) > 0.01
+
+
+@pytest.mark.parametrize("link", [0.1, 0.4])
+def test_derivatives_of_two_stops_at_once_are_those_of_differences(link):
+    system, *_ = two_at_once(link)
+    flow, phases = FlowMap(system), np.array([0.0, 1.5 * TURN])
+    z = to_state(flow, np.tile([0.1, 0.2, 0.3], 4))[None]
+    found = flow.shoot(z, phases, 0.9)
+    assert found.failure == ""
+    steps = (1e-5, 1e-6)
+    assert min(off_differences(flow, found, z, phases, 0.9, step) for step in steps) < 1e-6
+
+
 def bases(system):
     return np.array([system.participation[name] for name in system.interfaces])
 
