@@ -919,12 +919,13 @@ static void find_cornered(Motion *M)
 /* Look for a rigid stop whose force nothing tells, or more than one, with friction: where the forces
  * that hold the gaps would have to feed what closes them [Painlevé 1895; Génot and Brogliato 1999].
  * Elsewhere the leading minors of the matrix of their equations are positive, as without friction. */
-static void find_undecided(Motion *M)
+static void find_undecided(Motion *M, double phase)
 {
     Scratch *s = M->s;
     int slid_on = -1;
     find_cornered(M);
     if (M->undecided >= 0) return;
+    fill_directions(M, phase);
     for (int r = 0; r < M->fl->n_stops; r++)
         if (M->closed[r] && sliding_with(M, r) >= 0) slid_on = r;
     int n = slid_on >= 0 ? held_stops(M, true) : 0;
@@ -1005,7 +1006,7 @@ static void settle(Motion *M, int first, double phase, double t, const double *s
     close_shut(M, first, phase, roundings, struck);
     for (int round = 0; round < fl->n_stops; round++) {
         slip_pressed(M, phase);
-        find_undecided(M);
+        find_undecided(M, phase);
         contact_forces(M, phase);
         find_jammed(M, phase);
         if (M->undecided >= 0) return;

@@ -150,7 +150,7 @@ static void pass_event(Motion *M, int event, double h)
         if (M->closed[event]) M->closings[event]++;
     }
     switch_with(M, here, M->t, h, M->s->was_open);
-    if (M->undecided < 0) find_undecided(M);
+    if (M->undecided < 0) find_undecided(M, here);
     if (M->undecided < 0 && is_hard_disc(M->fl, event)) {
         contact_forces(M, here);
         find_jammed(M, here);

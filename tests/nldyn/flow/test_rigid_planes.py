@@ -149,13 +149,15 @@ def drawn(seed, coupled=0.35):
 def two_at_once(link):
     """Two pucks in bowls, shaken, and what links them; each is thrown on a floor of its own."""
     K = np.kron(np.diag([1.0, 1.6]), np.diag([1.0, 1.3, 0.7])) + link * np.ones((6, 6))
-    M = np.kron(np.diag([1.0, 1.4]), np.array([[1.0, 0.1, 0.2], [0.1, 1.2, -0.2], [0.2, -0.2, 1.5]]))
+    one = np.array([[1.0, 0.1, 0.2], [0.1, 1.2, -0.2], [0.2, -0.2, 1.5]])
+    M = np.kron(np.diag([1.0, 1.4]), one)
     names = ["x", "y", "z", "u", "v", "w"]
     stops = [
         RigidStop("z", 0.5, 0.05, -1, tangent="x", second_tangent="y", friction=0.4),
         RigidStop("w", 0.3, 0.02, -1, tangent="u", second_tangent="v", friction=0.25),
     ]
-    drive = [HarmonicForce(*each) for each in zip(names, [0.8, 0.6, 1.8] * 2, range(0, 360, 60), strict=True)]
+    sizes, turns = [0.8, 0.6, 1.8] * 2, range(0, 360, 60)
+    drive = [HarmonicForce(*each) for each in zip(names, sizes, turns, strict=True)]
     pressed = [ConstantForce("z", -1.5), ConstantForce("w", -1.2)]
     return System.from_matrices(
         M, K, dict(zip(names, np.eye(6), strict=True)), damping=0.2 * K, stops=stops,
