@@ -17,11 +17,15 @@ from nldyn.system.friction import Slider
 
 SHORT = 1e-6  # of the motion: rest that counts as none
 BESIDE = 1e-4  # of it: so long before and behind an instant the slip tells how fast it changes
-SLOW = 0.01  # of the fastest change: that of a slip that turns where it comes to rest
+# of the fastest change: that of a slip that turns where it comes to rest. Differences over BESIDE
+# leave 16 of it at the end of a branch over a belt's speed, and 134 at a speed lower by 5e-4
+SLOW = 100.0 * BESIDE
 TOUCH = 1e-6  # of the fastest slip: a slowest one that counts as none
 NONE = 1e-12  # the same as it sticks
 SAMPLES = 4000
-ALIKE = 2e-3  # relative: the friction at rest and the force by which it turns at once
+# relative: the friction at rest and the force by which it turns at once. Differences over BESIDE
+# leave 2.2 and 2.7 of it at both ends of a branch of a driven block, and 258 within it
+ALIKE = 20.0 * BESIDE
 
 
 def just_sticks(orbit: Orbit) -> Slider | None:
