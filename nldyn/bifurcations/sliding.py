@@ -50,7 +50,14 @@ CLOSE = 1e-9  # or how near to each other orbits on both sides are
 SHORTEST_STEP = 1e-6  # arclength of a step in which there may be no orbits between
 SAME_PLACE = 1e-8  # arclength within which contacts that are alike begin to stick at once
 BESIDE = (0.0, 0.01, -0.01, 0.1, -0.1, 1.0, -1.0)  # of that: where its orbit is if none is there
-NUDGES = (0.0, 0.1, -0.1, 0.3)  # of a way: where else orbits are looked for if none is found there
+NEARLY_CLOSE = 1e-8  # the same where there are none between
+NUDGES = (
+    0.0,
+    0.1,
+    -0.1,
+    0.3,
+    1.0,
+)  # of a way: where else orbits are looked for if none is found there
 
 
 @lru_cache(maxsize=16)  # of a step both ends are asked for, by all that look into it
@@ -187,7 +194,7 @@ def sliding_points_between(a: BranchNode, b: BranchNode) -> tuple[list[SpecialPo
 def _within(a: BranchNode, b: BranchNode, birth: Birth | None, number: int) -> SpecialPoint | None:
     """The end of a very short step that has what begins in it, where no orbits are between."""
     length = abs(b.arclength - a.arclength)
-    if birth is None or length > SHORTEST_STEP or birth.time > SHORT:
+    if birth is None or length > SHORTEST_STEP or birth.time > 10.0 * SHORT:
         return None
     rich = max((a, b), key=lambda node: len(words(node.orbit)[number]))
     return SpecialPoint(birth.kind, rich, length + rich.orbit.error)
@@ -268,9 +275,11 @@ class Between:
                 way = (last - limit) * CLOSER ** POWERS[kind]
                 trial = self._found(limit + way, way)
             except FAILURES:
-                if len(known) < ENOUGH:
-                    raise
-                break
+                if len(known) >= ENOUGH:
+                    break
+                if abs(last - bare) * self.length < NEARLY_CLOSE and known[-1][0] < SHORT:
+                    return self._special(kind, limit, abs(last - bare))
+                raise
         else:
             return None
         vanishes = known[-1][0] < max(SHORT, SHRUNK * known[0][0])

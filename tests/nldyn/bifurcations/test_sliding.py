@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from den_hartog import Swing, response
+from scipy.linalg import eigh
 from scipy.optimize import brentq, minimize_scalar
 from sliding import Body, Contact
 
@@ -28,6 +29,7 @@ from nldyn.branches.endings import Ending
 from nldyn.flow.stretches import OPEN, STUCK, Stretch
 from nldyn.system import DryFriction
 
+AXES = np.eye(2)
 TURN = 2.0 * math.pi
 SLIDING = ("CS", "GS", "AS")
 
@@ -157,12 +159,38 @@ def test_jenkins_element_ceases_to_slide_with_more_friction():
     assert branch.values.max() == pytest.approx(3.0)
 
 
+def test_a_platform_damper_slides_between_the_frequencies_of_the_linear_response():
+    """As in docs/examples/platform_damper.toml: where it sticks it is a spring of 4e5 N/m."""
+    mass, spring, ratio, most = np.diag([0.3, 1.0]), 4e5, 0.01, 4.0
+    stiffness = np.array([[1e5, -1e5], [-1e5, 1.6e6]])
+    system = System.from_matrices(
+        mass, stiffness, {"blade": AXES[0], "platform": AXES[1]}, modal_damping=ratio,
+        dampers=[DryFriction("platform", 8.0, 0.5, tangential_stiffness=spring)],
+        excitation=[HarmonicForce("blade", 1.0)],
+    )  # fmt: skip
+    squares, shapes = eigh(stiffness, mass)
+    damping = mass @ shapes @ np.diag(2.0 * ratio * np.sqrt(squares)) @ shapes.T @ mass
+
+    def left(hz):
+        omega = TURN * hz
+        dynamic = stiffness + spring * np.diag(AXES[1]) - omega**2 * mass + 1j * omega * damping
+        return most - spring * abs(np.linalg.solve(dynamic, AXES[0])[1])
+
+    branch = continue_branch(solve_orbit(system, 89.0), (85.0, 93.0))
+    found = sliding_points(branch)
+    assert [special.kind for special in found] == ["AS", "AS"]
+    for special, low, high in zip(found, (85.0, 89.0), (88.0, 93.0), strict=True):
+        exact = brentq(left, low, high, xtol=1e-13)
+        assert special.frequency_hz == pytest.approx(exact, rel=1e-9)
+    changes_only_there(branch)
+
+
 def over_a_plane(friction=1.0):
     """What a spring holds on a plane, pulled on an ellipse; it does the same in all directions."""
-    axes, pull = np.eye(2), (1.0, 0.5)
+    pull = (1.0, 0.5)
     dry = DryFriction("y", 1.0, friction, second_tangent="z", tangential_stiffness=SPRING)
     return System.from_matrices(
-        axes, axes, {"y": axes[0], "z": axes[1]}, damping=DAMPING * axes, dampers=[dry],
+        AXES, AXES, {"y": AXES[0], "z": AXES[1]}, damping=DAMPING * AXES, dampers=[dry],
         excitation=[HarmonicForce("y", pull[0]), HarmonicForce("z", pull[1], 90.0)],
     )  # fmt: skip
 
@@ -257,9 +285,6 @@ def test_what_begins_is_told_by_what_is_left_without_it(bare, rich, kind, length
 )
 def test_what_is_no_sliding_bifurcation_has_no_name(bare, rich):
     assert born(bare, rich) is None
-
-
-AXES = np.eye(2)
 
 
 def two(stops=(), dampers=(), contacts=()):
