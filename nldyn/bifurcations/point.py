@@ -140,8 +140,9 @@ class SpecialPoint:
     Parameters
     ----------
     kind : str
-        LP, PD, NS, BP or GR: cyclic fold, flip, Neimark-Sacker, branch point, grazing; on curves
-        also CP, GPD, LPPD, R1 to R4 and pairs, see the theory; or that of an `Event`.
+        LP, PD, NS, BP or GR: cyclic fold, flip, Neimark-Sacker, branch point, grazing; CS, GS or
+        AS: crossing-, grazing- or adding-sliding, where a motion begins or ceases to stick; on
+        curves also CP, GPD, LPPD, R1 to R4 and pairs, see the theory; or that of an `Event`.
     point : BranchNode
         The orbit at which it happens.
     error : float
