@@ -213,8 +213,9 @@ def plot_diagram(
     yscale : {"linear", "log"}
         Scale of the displacement axis.
     special_points : sequence of str, optional
-        Kinds to mark: LP, PD, NS, BP, GR, CS, GS, AS or events; all unless given. Of more than 60
-        points only those beside a stable orbit are marked, and the legend says how many of how many.
+        Kinds to mark: LP, PD, NS, BP, GR, CS, GS, AS or events; all unless given. Of more than
+        60 points only those beside a stable orbit are marked, and the legend says how many of how
+        many.
     unit : {"m", "mm", "µm", "nm"}, optional
         Unit of the displacement axis, or of a rotation "rad", "mrad", "µrad" or "nrad"; chosen by
         the largest value unless given.
