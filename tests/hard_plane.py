@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 
 Vector = NDArray[np.float64]
 NO_SPEED = 1e-12  # times the fastest: what is left where it rests
-BEGUN = 1e-6  # time after which what is let go is on its way
-STIFF = 1e-2  # the same until which a method for stiff equations takes it there
+PULLED, LET_GO = 1e-6, 1e-4  # time after which what leaves with a pull, or without, is on its way
+SURE = 1e-3  # the same after which its speed is far above what it is computed with
 
 
 @dataclass
@@ -81,6 +81,16 @@ class Body:
         v = self.speed(y)
         return self.rate(t, y, self.coefficient * self.pressed(y) * v / np.hypot(*v))
 
+    def slowing(self, t: float, y: Vector) -> Vector:
+        """The stiff part of the derivatives of `slid`: that of the direction of friction."""
+        n, v = self.size, self.speed(y)
+        across = np.eye(2) - np.outer(v, v) / (v @ v)
+        turn = self.coefficient * self.pressed(y) / np.hypot(*v) * across
+        J = np.zeros((2 * n, 2 * n))
+        J[:n, n:] = np.eye(n)
+        J[n:, n:] = -np.linalg.solve(self.mass, self.tangents.T @ turn @ self.tangents)
+        return J
+
     def held(self, t: float, y: Vector) -> Vector:
         return self.rate(t, y, self.holding(t, y))
 
@@ -92,6 +102,9 @@ class Body:
             np.hypot(*self.holding(t, y))
         )
 
+    def openings(self) -> list[Callable[[float, Vector], float]]:
+        return [] if self.normal is None else [lambda t, y: self.depth(y)]
+
     def run(
         self, rate: Callable[[float, Vector], Vector], t: float, y: Vector, end: float,
         events: list[Callable[[float, Vector], float]], method: str = "DOP853",
@@ -100,8 +113,9 @@ class Body:
         """To the first event, whose number is told, or to the end, -1."""
         for event in events:
             event.terminal, event.direction = True, -1  # type: ignore[attr-defined]
+        stiff = {"jac": self.slowing} if method != "DOP853" else {}
         found = solve_ivp(rate, (t, end), y, method, rtol=2e-13, atol=1e-14, events=events,
-                          max_step=longest)  # fmt: skip
+                          max_step=longest, **stiff)  # fmt: skip
         hit = [i for i, times in enumerate(found.t_events or []) if times.size]
         return float(found.t[-1]), found.y[:, -1], hit[0] if found.status == 1 else -1
 
@@ -124,13 +138,25 @@ class Body:
 
         more = brentq(excess, 0.0, 2.0 * float(np.hypot(*(B @ h)))) if excess(0.0) > 1e-9 else 0.0
         u = along(more)
-        h_later = self.holding(t + BEGUN, y + BEGUN * self.held(t, y))
-        growth = B @ (h_later - h)
-        y = y + BEGUN * self.held(t, y)
-        v = u * (more * BEGUN + 0.5 * BEGUN * float(u @ growth))
+        begun = PULLED if more > 0.0 else LET_GO
+        t, y, _ = self.run(self.held, t, y, t + begun, [])
+        # what would hold it grows, and friction with what presses it on
+        lacks = float(u @ (self.holding(t, y) - h)) - (self.coefficient * self.pressed(y) - most)
+        v = u * begun * (more + 0.5 * lacks / float(u @ np.linalg.solve(B, u)))
         y[self.size :] += np.linalg.solve(self.mass, np.linalg.solve(B, v) @ self.tangents)
-        t, y, _ = self.run(self.slid, t + BEGUN, y, min(t + STIFF, end), [], "Radau")
+        t, y, _ = self.run(self.slid, t, y, min(t + SURE, end), [], "Radau")
         return t, y
+
+    def speed_up(self, t: float, y: Vector, end: float) -> tuple[float, Vector, int]:
+        """To its fastest (0), to where the stop opens (1), or to the end (-1).
+
+        It is so slow at first that the equations are stiff.
+        """
+
+        def growth(t: float, y: Vector) -> float:
+            return float(self.speed(y) @ self.tangents @ self.slid(t, y)[self.size :])
+
+        return self.run(self.slid, t, y, end, [growth, *self.openings()], "LSODA")
 
     def slide(self, t: float, y: Vector, end: float) -> tuple[float, Vector, int]:
         """To rest (0), to where the stop opens (1), or to the end (-1)."""
@@ -140,18 +166,18 @@ class Body:
             fast = np.hypot(*self.speed(z[:-1]))
             return np.asarray(fast * np.append(self.slid(z[-1], z[:-1]), 1.0))
 
+        opens = [lambda s, z, f=f: f(z[-1], z[:-1]) for f in self.openings()]
         events = [
             lambda s, z: float(np.hypot(*self.speed(z[:-1]))) - NO_SPEED * fastest,
             lambda s, z: end - z[-1],
+            *opens,
         ]
-        if self.normal is not None:
-            events.append(lambda s, z: self.depth(z[:-1]))
         _, z, which = self.run(extended, 0.0, np.append(y, t), 1e9, events, longest=np.inf)
         return float(z[-1]), z[:-1], {0: 0, 1: -1, 2: 1}[which]
 
     def followed(self, y: Vector, end: float) -> Vector:
         """The state at a time, from one that slides or is open at zero on."""
-        t, self.met = 0.0, []
+        t, left, self.met = 0.0, False, []
         self.mode = "open" if self.normal is not None and self.depth(y) < 0.0 else "slides"
         while t < end:
             if self.mode == "open":
@@ -161,7 +187,12 @@ class Body:
                 self.mode = "slides"
                 self.met.append("close")
             elif self.mode == "slides":
-                t, y, which = self.slide(t, y, end)
+                ways = [self.speed_up, self.slide] if left else [self.slide]
+                left = False
+                for way in ways:
+                    t, y, which = way(t, y, end)
+                    if which != 0:
+                        break
                 if which < 0:
                     break
                 if which == 1:
@@ -174,6 +205,7 @@ class Body:
                     self.met.append("stick")
                 else:
                     t, y = self.leave(t, y, end)
+                    left = True
                     self.met.append("turn")
             else:
                 t, y, which = self.run(self.held, t, y, end, [lambda t, y: self.margin(t, y)])
@@ -182,4 +214,5 @@ class Body:
                 self.mode = "slides"
                 self.met.append("slip")
                 t, y = self.leave(t, self.stopped(y), end)
+                left = True
         return y
