@@ -196,6 +196,8 @@ class Body:
         """What touches the stop without speed does, with the state in place."""
         u = self.speeds(y)[1:]
         if np.hypot(*u) > NONE * max(1.0, np.abs(y).max()):
+            if self.yields[0] @ [1.0, *(self.coefficient * u / np.hypot(*u))] <= 0.0:
+                raise UndecidedError
             if self.sliding(t, y, u / np.hypot(*u))[0] <= 0.0:
                 return "leaves the stop", y
             return "slides", self.held(y, 1)

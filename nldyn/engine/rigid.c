@@ -718,14 +718,15 @@ static Leaving ways_to_leave(const Motion *M, int stop, int slider)
     return found;
 }
 
-/* let what a rigid stop presses on slide over its plane, along the one way in which it leaves; where
- * there are several, or none though it is pressed on, that is told */
-static void fill_way_off(Motion *M, int stop, int slider, double *u)
+/* Fill the one way in which what a rigid stop presses on leaves over its plane; where there are several,
+ * or none though it is pressed on, that is told. Whether it slides: else it leaves the stop. */
+static bool fill_way_off(Motion *M, int stop, int slider, double *u)
 {
     Leaving way = ways_to_leave(M, stop, slider);
     bool none = way.u[0] == 0.0 && way.u[1] == 0.0;
     if (way.count > 1 || (none && way.pressed > 0.0)) M->undecided = stop;
     if (!none) memcpy(u, way.u, sizeof way.u);
+    return !none || way.pressed > 0.0;
 }
 
 /* let a slider go that sticks; s->stop_forces are filled */
@@ -743,7 +744,7 @@ static void let_go(Motion *M, int s)
         fill_yield(fl, s, B);
         for (int d = 0; d < 2; d++) free[d] = B[2 * d] * held[d] + B[1] * held[1 - d];
         fill_leaving(B, free, grip(fl, s) * larger(held_on(M, s), 0.0), u);
-        if (stop >= 0 && is_rigid(fl, stop)) fill_way_off(M, stop, s, u);
+        if (stop >= 0 && is_rigid(fl, stop) && !fill_way_off(M, stop, s, u)) return;
         M->s->heading[s] = u[0];
         M->s->heading[other] = u[1];
     }

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigid_plane import Body
+from rigid_plane import Body, UndecidedError
 from sliding import off_differences
 
 from nldyn import (
@@ -216,7 +216,12 @@ def agrees(seed, coupled=0.35):
     system, body, omega, start = drawn(seed, coupled)
     phases, flow = np.array([0.0, 1.3 * TURN]), FlowMap(system)
     z = to_state(flow, start)[None]
-    found, expected = flow.shoot(z, phases, omega), body.followed(start, phases[1] / omega)
+    found = flow.shoot(z, phases, omega)
+    try:
+        expected = body.followed(start, phases[1] / omega)
+    except UndecidedError:
+        assert "Painlevé" in found.failure
+        return set()
     assert found.failure == ""
     size = 1.0 + np.abs(found.jacobians).max()
     np.testing.assert_allclose(from_state(flow, found.ends[0]), expected, atol=1e-9 * size)
