@@ -166,9 +166,12 @@ def at_rest_between(a: BranchNode, b: BranchNode) -> BranchNode | None:
     """
     if not isinstance(a.condition, Turning):
         return None
-    first, last = swing(a.orbit), swing(b.orbit)
-    if not first * last < 0.0:
+    start, last = swing(a.orbit), swing(b.orbit)
+    if not start * last < 0.0:
         return None
+    # rest itself has no frequency
+    aim = 0.5 * SMALL * start
+    first, last = start - aim, last - aim
     chord, low, high, end = Chord(a, b), 0.0, 1.0, a
     for _ in range(MOST_SECANTS):
         share = low + (high - low) * first / (first - last)
@@ -176,8 +179,8 @@ def at_rest_between(a: BranchNode, b: BranchNode) -> BranchNode | None:
             end = chord.at(share)
         except FAILURES:
             break
-        found = swing(end.orbit)
-        if abs(found) < SMALL * abs(swing(a.orbit)):
+        found = swing(end.orbit) - aim
+        if abs(found) < 0.5 * abs(aim):
             break
         if found * last < 0.0:
             low, first = share, found
