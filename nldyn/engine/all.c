@@ -14,6 +14,8 @@
 #include "resolution.c"
 #include "round_panel.c"
 #include "friction_disc.c"
+#include "following.c"
+#include "influences.c"
 #include "panel.c"
 #include "many.c"
 #include "panel_end.c"

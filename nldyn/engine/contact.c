@@ -11,6 +11,7 @@
 #define FARTHER 10.0 /* and the next panel is so many times longer */
 #define WITHIN 1e-6 /* of a panel: a doubtful place nearer to an end is that of a known switch */
 #define MOST_ATTEMPTS 100
+#define BEYOND 1.001 /* of a length in which nothing was seen: as much as a corrected instant asks for */
 #define ELSEWHERE 1e-4 /* of its radius: a node off a circle that holds a body */
 
 /* a panel that is being looked for */
@@ -18,6 +19,8 @@ typedef struct {
     double phase;      /* forcing phase at its start, less whole turns */
     double h_max;      /* its longest length */
     int kind, aim;     /* aim: the stop at whose event it is to end, or -1 */
+    int solved_for;    /* that of the panel that was solved last */
+    bool decays;       /* whether that one shows what the stops damp */
     double h, tried;   /* length; that first tried */
     bool looked;       /* whether a doubtful place has been cut at */
     int smooth, to_switch; /* kinds without and with an event at its end */
@@ -130,15 +133,16 @@ static void carry_noise(Motion *M, double h)
     }
 }
 
-/* whether a solved panel resolves what happens in it */
+/* whether a solved panel resolves what happens in it; that takes a while */
 static bool fine_enough(const Motion *M, const Trial *trial)
 {
     const Flow *fl = M->fl;
+    if (!trial->decays) return false;
     if (!resolved(fl, M->tab, trial->kind, trial->h, M->s->rounding, M->panel, M->s)) return false;
     bool ends = trial->kind % 2 == 1;
     double end_phase = trial->phase + fl->omega * trial->h;
     return trial->h <= 1.5 * graded_length(fl, M->panel, M->w_end, end_phase, trial->h, -1.0, ends,
-                                           ends ? trial->aim : -1);
+                                           ends ? trial->solved_for : -1);
 }
 
 /* where a panel is expected to end with a release, and more time is left, aim at that */
@@ -155,33 +159,72 @@ static void aim_at_release(const Motion *M, Trial *trial)
     }
 }
 
-/* whether a panel that aims at an event ends with it, goes on, or is to be tried again; without
- * any of them, -1 */
-static int reach_aim(Motion *M, Trial *trial, bool event, bool fine)
+/* time from the end of a panel to the event that it aims at, and whether it is there: as near as
+ * rounding tells */
+static double time_to_aim(const Motion *M, const Trial *trial, bool *there)
 {
     const Flow *fl = M->fl;
     double h = trial->h, end_phase = trial->phase + fl->omega * h;
     const double *w = M->w_end;
     int aim = trial->aim;
-    double dh = time_to_event(fl, aim, M->closed, w, end_phase);
-    double off = watched_pace(fl, aim, M->closed, w, end_phase).value;
-    int out = watched(fl, aim, M->closed, w, end_phase);
-    bool there = fabs(off) <= gap_noise(fl, out, M->w);
     if (rubs(fl, aim)) {
-        dh = time_to_slip(M, aim, trial->kind, end_phase, h, &off);
+        double off, dh = time_to_slip(M, aim, trial->kind, end_phase, h, &off);
         double noise = fl->slides[aim] != 0 ? slip_noise(fl, aim, w, end_phase)
                                             : hold_noise(fl, aim, w);
-        there = fabs(dh) <= RELEASED * h || fabs(off) <= noise ||
-                (is_sprung(fl, aim) && fabs(dh) <= SUM_ROUNDING * end_phase / fl->omega);
-    } else if (ends_smoothly(fl, aim, M->closed)) {
-        dh = time_to_release(fl, M->tab, aim, trial->kind, h, M->panel);
-        there = fabs(dh) <= RELEASED * h;
+        *there = fabs(dh) <= RELEASED * h || fabs(off) <= noise ||
+                 (is_sprung(fl, aim) && fabs(dh) <= SUM_ROUNDING * end_phase / fl->omega);
+        return dh;
     }
-    if (fabs(dh) <= instant_with(fl, aim, w, end_phase, h, M->closed) ||
-        (dh < INFINITY && there)) {
-        if (fine) return TAKEN_WITH_EVENT;
-    } else if (-0.5 * h < dh && dh < h && (dh < 0.0 || h < trial->h_max)) {
-        trial->h = smaller(h + dh, trial->h_max);
+    if (ends_smoothly(fl, aim, M->closed)) {
+        double dh = time_to_release(fl, M->tab, aim, trial->kind, h, M->panel);
+        *there = fabs(dh) <= RELEASED * h;
+        return dh;
+    }
+    double off = watched_pace(fl, aim, M->closed, w, end_phase).value;
+    *there = fabs(off) <= gap_noise(fl, watched(fl, aim, M->closed, w, end_phase), M->w);
+    return time_to_event(fl, aim, M->closed, w, end_phase);
+}
+
+/* whether that is the end of the panel */
+static bool at_aim(const Motion *M, const Trial *trial, double dh, bool there)
+{
+    const Flow *fl = M->fl;
+    double h = trial->h, end_phase = trial->phase + fl->omega * h;
+    return fabs(dh) <= instant_with(fl, trial->aim, M->w_end, end_phase, h, M->closed) ||
+           (dh < INFINITY && there);
+}
+
+/* whether another length, not far from this one, leads there; takes it */
+static bool aim_again(Trial *trial, double dh)
+{
+    double h = trial->h;
+    if (!(-0.5 * h < dh && dh < h && (dh < 0.0 || h < trial->h_max))) return false;
+    trial->h = smaller(h + dh, trial->h_max);
+    return true;
+}
+
+/* The same before anything else is asked of a panel with friction, whose aim is the first event that
+ * was seen: what ends it will be looked at as all are. */
+static bool still_off(const Motion *M, Trial *trial)
+{
+    bool there;
+    if (trial->aim < 0 || M->panel->sought == M->panel->na) return false;
+    double dh = time_to_aim(M, trial, &there);
+    return !at_aim(M, trial, dh, there) && aim_again(trial, dh);
+}
+
+/* whether a panel that aims at an event ends with it, goes on, or is to be tried again; without
+ * any of them, -1 */
+static int reach_aim(Motion *M, Trial *trial, bool event)
+{
+    const Flow *fl = M->fl;
+    double h = trial->h;
+    int aim = trial->aim;
+    bool there;
+    double dh = time_to_aim(M, trial, &there);
+    if (at_aim(M, trial, dh, there)) {
+        if (fine_enough(M, trial)) return TAKEN_WITH_EVENT;
+    } else if (aim_again(trial, dh)) {
         return AGAIN;
     } else if (!event && dh == INFINITY && !M->closed[aim] && h < MISSED * trial->tried) {
         change_length(M, trial, trial->kind, FARTHER); /* it is farther off than it was seen */
@@ -189,14 +232,14 @@ static int reach_aim(Motion *M, Trial *trial, bool event, bool fine)
     } else if (!event && dh > h && rubs(fl, aim) && h < trial->h_max) {
         change_length(M, trial, trial->kind, smaller(FARTHER, trial->h_max / h));
         return AGAIN; /* it came sooner in the motion before */
-    } else if (dh > 0.0 && fine) { /* the contact goes on */
+    } else if (dh > 0.0 && fine_enough(M, trial)) { /* the contact goes on */
         return TAKEN;
     }
     return -1;
 }
 
 /* look at a solved panel: take it, or change its length */
-static int judge(Motion *M, Trial *trial, Event event, bool fine, bool lost)
+static int judge(Motion *M, Trial *trial, Event event, bool lost)
 {
     const Flow *fl = M->fl;
     if (WITHIN < event.doubtful && event.doubtful < 1.0 - WITHIN && !trial->looked) {
@@ -225,9 +268,9 @@ static int judge(Motion *M, Trial *trial, Event event, bool fine, bool lost)
     }
     aim_at_release(M, trial);
     if (trial->aim >= 0 && !lost) {
-        int verdict = reach_aim(M, trial, event.stop >= 0, fine);
+        int verdict = reach_aim(M, trial, event.stop >= 0);
         if (verdict >= 0) return verdict;
-    } else if (fine && !lost) {
+    } else if (!lost && fine_enough(M, trial)) {
         return TAKEN;
     }
     trial->aim = -1;
@@ -272,6 +315,7 @@ static int contact_panel(Motion *M, double phase, double h_max, Trial *trial)
     panel->kept = false;
     fill_rounding(M);
     *trial = first_trial(M, phase, h_max);
+    double clear = 0.0; /* length in which nothing was seen before what is aimed at */
     for (int attempt = 0; attempt < MOST_ATTEMPTS; attempt++) {
         if (trial->h <= HALF_ULP * trial->tried || phase + fl->omega * trial->h == phase)
             return end_at_once(M, trial);
@@ -279,22 +323,28 @@ static int contact_panel(Motion *M, double phase, double h_max, Trial *trial)
         carry_noise(M, trial->h);
         bool found = solve_panel(fl, M->tab, trial->kind, phase, M->w, trial->h, M->s->noise,
                                  panel, M->s);
-        bool decays = false;
+        bool lost = attempt % 20 == 19; /* the instant that is aimed at goes to and fro */
         Event event = {-1, 2.0, 2.0};
         if (found) {
-            decays = shows_decay(fl, M->tab, trial->kind, trial->h, panel);
+            trial->solved_for = trial->aim;
+            trial->decays = shows_decay(fl, M->tab, trial->kind, trial->h, panel);
             panel_end(fl, M->tab, trial->kind, phase, M->w, trial->h, panel, M->w_end, M->s);
+            if (panel->na < fl->n_stops || any_led(panel))
+                drive_back(fl, M->tab, M->w, panel, M->s);
+            if (any_led(panel))
+                show_following(fl, M->tab, trial->kind, phase, trial->h, panel, M->s);
+            if (trial->h <= BEYOND * clear && !lost && still_off(M, trial)) continue;
             event = first_event(M, trial->kind, phase, trial->h);
             found = !far_off(M, trial, event);
         }
         if (!found) {
             guess_again(M, trial, SHORTER * smaller(trial->h, trial->tried));
             trial->tried = trial->h;
+            clear = 0.0;
             continue;
         }
-        bool fine = decays && fine_enough(M, trial);
-        bool lost = attempt % 20 == 19; /* the instant that is aimed at goes to and fro */
-        int verdict = judge(M, trial, event, fine, lost);
+        clear = trial->h * smaller(event.where, 1.0);
+        int verdict = judge(M, trial, event, lost);
         if (verdict == TAKEN) trial->aim = -1;
         if (verdict != AGAIN) return OK;
     }

@@ -214,6 +214,10 @@ typedef struct {
  * proportion to it. */
 typedef struct {
     int na, m, outputs;
+    int sought, orders; /* closed stops whose forces are unknowns, and orders of outputs that these
+                         * forces go with; the others follow, see following.c */
+    int n_stuck, *stuck; /* (n_stuck,) places of those that stick */
+    int *ways;           /* (na,) how those that follow slid as the panel was made */
     int *active;      /* (na,) closed stops */
     double *output;   /* (outputs, m) values at the nodes */
     double *F;        /* (na, m) forces */
@@ -228,8 +232,13 @@ typedef struct {
     double *home;     /* (n, 4, m) exp(-A t_j) */
     double *to;       /* (outputs, 2n, m) row exp(A t_i) */
     double *back;     /* (na, 2n, m) exp(-A t_j) force */
-    double *G;        /* (na m, outputs m) outputs at the nodes per force at the nodes, by forces */
-    double *inverse;  /* (na m, na m) of 1 - slope G, at these slopes or earlier ones, see `invert` */
+    double *G;        /* (sought m, orders sought m) outputs at the nodes per force at the nodes, by
+                       * forces, with what follows */
+    double *reach;    /* (n_stuck m, orders sought m) the same of forces that stick */
+    double *loose;    /* (n_stuck m, n_stuck m) inverse of their own equations */
+    double *share;    /* (sought m, n_stuck m) what they are per force sought */
+    double *base;     /* (n_stuck m,) and without these */
+    double *inverse;  /* (sought m, sought m) of 1 - slope G, at these slopes or earlier ones, see `invert` */
     int *order;       /* (na m,) scratch for it */
     bool kept;        /* whether it is worth keeping */
     bool many;        /* whether the forces are found by iteration, without G and its inverse */
@@ -256,7 +265,7 @@ typedef struct {
     double *slopes, *forced, *swayed;                  /* resolved */
     double *viscosity, *off, *hold_matrix, *shift, *kick; /* hold_speeds */
     int *hold_order;
-    double *forces, *part, *change;                    /* panel_columns */
+    double *forces, *answers, *square, *part, *change; /* panel_columns */
     double *last_forces; /* (n_stops, 1 + n_columns) see `fill_last_force` */
     double *pushed, *carried, *added, *driven_many, *flown, *pushing, *showing; /* many stops */
     double *stop_forces, *pushes, *first_pushes, *held, *mobility; /* rigid stops */

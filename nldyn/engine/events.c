@@ -473,13 +473,27 @@ static bool held_open(const Motion *M, int stop)
     return false;
 }
 
-/* the first event within a panel */
+/* whether a slider that sticks is held to the other side of its friction all the time: to this one it
+ * may only slip later */
+static bool held_away(const Motion *M, int s, int position, int side)
+{
+    const Panel *panel = M->panel;
+    const double *F = panel->F + (size_t)position * panel->m;
+    bool away = false;
+    if (M->fl->slides[s] != 0 || !is_slider(M->fl, s) || is_disc(M->fl, s)) return false;
+    for (int i = 0; i < panel->m; i++) {
+        if (side * F[i] > 0.0) return false;
+        away = away || F[i] != 0.0;
+    }
+    return away;
+}
+
+/* the first event within a panel; s->driven is filled where not all stops are closed */
 static Event first_event(const Motion *M, int kind, double phase, double h)
 {
     const Flow *fl = M->fl;
     Event found = {-1, 2.0, 2.0};
     int position = -1;
-    if (M->panel->na < fl->n_stops) drive_back(fl, M->tab, M->w, M->panel, M->s);
     for (int stop = 0; stop < fl->n_stops; stop++) {
         if (M->closed[stop]) position++; /* a bond is always closed */
         if (is_bond(fl, stop) || is_mover(fl, stop) || is_mate(fl, stop)) continue;
@@ -494,7 +508,8 @@ static Event first_event(const Motion *M, int kind, double phase, double h)
             continue;
         }
         for (int side = -1; side <= 1; side += 2) /* what slides has one only */
-            if ((fl->slides[stop] == 0 && !is_disc(fl, stop)) || side == 1)
+            if (((fl->slides[stop] == 0 && !is_disc(fl, stop)) || side == 1) &&
+                !held_away(M, stop, position, side))
                 find_event(M, kind, phase, h, stop, show_friction(M, phase, h, stop, position, side),
                            &found);
     }

@@ -4,11 +4,13 @@
 #define SLOW_DECAY 0.35 /* exponent up to which `series_expm1` is exact */
 #define WHOLE 6755399441055744.0 /* 1.5 2^52: a sum with it has no fraction */
 
-/* exp(block t), also for equal or zero eigenvalues */
+/* exp(block t), also for equal or zero eigenvalues; without any it is 1 + block t */
 static Square block_exponential(const double *block, double t)
 {
     double mean = 0.5 * (block[0] + block[3]), half = 0.5 * (block[0] - block[3]);
     double square = half * half + block[1] * block[2], even, odd;
+    if (mean == 0.0 && square == 0.0)
+        return (Square){1.0 + t * half, t * block[1], t * block[2], 1.0 - t * half};
     if (square < 0.0) {
         double rate = sqrt(-square), size = exp(mean * t);
         even = size * cos(rate * t);
@@ -55,6 +57,9 @@ static ThereAndBack there_and_back(const double *block, double t)
 {
     double mean = 0.5 * (block[0] + block[3]), half = 0.5 * (block[0] - block[3]);
     double square = half * half + block[1] * block[2], rate = sqrt(fabs(square));
+    if (mean == 0.0 && square == 0.0)
+        return (ThereAndBack){block_exponential(block, t), block_exponential(block, -t), half * t,
+                              -half * t};
     double less = expm1(mean * t), size = less > -0.5 ? 1.0 + less : exp(mean * t);
     if (square < 0.0)
         return swung_there_and_back(block, rate, less, size, sin(0.5 * rate * t),

@@ -50,13 +50,10 @@ static void carry_modes(const Flow *fl, const Gauss *tab, const Panel *panel, Sc
 {
     int m = panel->m;
     const double *integrate = tab->integrate + (size_t)panel->made_kind * m * m;
+    double *restrict impulses = s->inner;
     for (int k = 0; k < fl->size; k++) {
-        double *restrict carried = s->carried + (size_t)k * m;
-        for (int i = 0; i < m; i++) carried[i] = 0.0;
-        for (int j = 0; j < m; j++) {
-            double impulse = -panel->made_length * s->pushed[k * m + j];
-            for (int i = 0; i < m; i++) carried[i] += integrate[j * m + i] * impulse;
-        }
+        for (int j = 0; j < m; j++) impulses[j] = -panel->made_length * s->pushed[k * m + j];
+        combine(s->carried + (size_t)k * m, NULL, m, integrate, m, impulses, 1, m);
     }
 }
 

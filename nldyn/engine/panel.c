@@ -13,143 +13,13 @@
 #define SOLVED 1e-13  /* relative change of the penetrations that Newton's method would still make */
 #define SLOWEST 1e-3  /* 1 - rate of its convergence, at least, in the estimate of that */
 #define LARGEST_ANGLE 1e5 /* that `fill_sines` is left to */
-#define ALONG 1e-9   /* of the cosine squared: a slider that moves as a stop does */
 #define ROUGH 3       /* steps in which the turning of friction over a plane is not led by forces */
 #define MOST_TURNS 12  /* steps in which what slides over a plane settles: else it goes to and fro */
 #define LEAVING 6      /* rounds of the guess of how what is let go over a plane leaves */
 #define STALE 0.1     /* rate from which its matrix is inverted anew */
 
-static bool is_many(const Flow *fl, const Panel *panel);
 static bool solve_many(const Flow *fl, const Gauss *tab, const double *noise, Panel *panel,
                        Scratch *s);
-
-/* make the panel an empty one for some closed stops */
-static void renew_panel(const Flow *fl, Panel *panel, const int *active, int na)
-{
-    panel->na = na;
-    panel->outputs = na;
-    panel->round = false;
-    for (int a = 0; a < na; a++) {
-        panel->active[a] = active[a];
-        panel->round = panel->round || is_round(fl, active[a]);
-        if (panel->outputs == na && needs_speed(fl, active[a])) panel->outputs = 2 * na;
-        if (holds_around(fl, active[a])) panel->outputs = 3 * na;
-    }
-    for (int i = 0; i < panel->outputs * panel->m; i++) panel->output[i] = 0.0;
-    for (int a = 0; a < na; a++) panel->decayed[a] = panel->decay[a] = 0.0;
-    panel->kept = false;
-    panel->made_kind = -1;
-    panel->inverted[0] = NAN;
-    panel->made_length = 0.0;
-}
-
-static bool same_stops(const Panel *panel, const int *active, int na)
-{
-    if (panel->na != na) return false;
-    for (int a = 0; a < na; a++)
-        if (panel->active[a] != active[a]) return false;
-    return true;
-}
-
-/* which row of a stop an output of a panel is: of what is held the acceleration */
-static int output_order(const Flow *fl, int stop, int rate)
-{
-    return rate == 0 && is_held(fl, stop) ? 2 : rate;
-}
-
-/* whether forces act on an output at once: it is an acceleration, but what holds it does not count */
-static bool acts_at_once(const Flow *fl, const Panel *panel, int o, int a)
-{
-    int stop = panel->active[o % panel->na], other = panel->active[a];
-    if (o < panel->na) return is_held(fl, stop) && stop != other;
-    if (o < 2 * panel->na || !is_planar(fl, stop)) return false;
-    return other != stop && other != partner_row(fl, stop);
-}
-
-/* whether a slider moves as another stop does, over a plane in some direction of it */
-static bool moves_with(const Flow *fl, int slider, int stop)
-{
-    double own = stop_of(fl, stop)->mobility, first = between(fl, slider, stop), B[3];
-    if (!is_disc(fl, slider))
-        return squared(first) >= (1.0 - ALONG) * own * stop_of(fl, slider)->mobility;
-    fill_yield(fl, slider, B);
-    double second = between(fl, (int)stop_of(fl, slider)->beside, stop);
-    double along = B[2] * first * first - 2.0 * B[1] * first * second + B[0] * second * second;
-    return along >= (1.0 - ALONG) * own * (B[0] * B[2] - B[1] * B[1]);
-}
-
-/* fill the rows of a block in to, rise and back, by its exponentials: there (4, m), back (4, m) and
- * the diagonal of exp(A t) - 1 (2, m) */
-static void fill_block_responses(const Flow *fl, Panel *panel, int b, const double *there,
-                                 const double *back, const double *less)
-{
-    int na = panel->na, m = panel->m, size = fl->size, j = 2 * b;
-    for (int o = 0; o < panel->outputs; o++) {
-        int stop = panel->active[o % na];
-        const double *row = row_of(fl, output_order(fl, stop, o / na), stop);
-        double x = row[j], y = row[j + 1];
-        double *restrict to = panel->to + ((size_t)o * size + j) * m;
-        for (int i = 0; i < m; i++) to[i] = x * there[i] + y * there[2 * m + i];
-        for (int i = 0; i < m; i++) to[m + i] = x * there[m + i] + y * there[3 * m + i];
-        if (o >= na) continue;
-        double *restrict rise = panel->rise + ((size_t)o * size + j) * m;
-        for (int i = 0; i < m; i++) rise[i] = x * less[i] + y * there[2 * m + i];
-        for (int i = 0; i < m; i++) rise[m + i] = x * there[m + i] + y * less[m + i];
-    }
-    for (int a = 0; a < na; a++) {
-        const double *push = push_of(fl, panel->active[a]) + j;
-        double x = push[0], y = push[1];
-        double *restrict into = panel->back + ((size_t)a * size + j) * m;
-        for (int i = 0; i < m; i++) into[i] = back[i] * x + back[m + i] * y;
-        for (int i = 0; i < m; i++) into[m + i] = back[2 * m + i] * x + back[3 * m + i] * y;
-    }
-}
-
-/* fill G from `to` and `back` */
-static void fill_influences(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel,
-                            Scratch *s)
-{
-    int na = panel->na, m = panel->m, height = panel->outputs * m;
-    const double *integrate = tab->integrate + (size_t)kind * m * m, *product = s->product;
-    for (int o = 0; o < panel->outputs; o++)
-        for (int a = 0; a < na; a++) {
-            multiply_transposed(fl->watch, panel->back + (size_t)a * fl->size * m, m,
-                                panel->to + (size_t)o * fl->size * m, s->product, m, fl->size, m);
-            double *restrict G = panel->G + (size_t)a * m * height + o * m;
-            for (int j = 0; j < m; j++)
-                for (int i = 0; i < m; i++)
-                    G[(size_t)j * height + i] = -h * integrate[j * m + i] * product[j * m + i];
-            if (acts_at_once(fl, panel, o, a)) {
-                double kick = between(fl, panel->active[o % na], panel->active[a]);
-                for (int i = 0; i < m; i++) G[(size_t)i * height + i] -= kick;
-            }
-        }
-}
-
-/* fill what a panel of length h needs to know of the linear part: there, home, to, rise, back,
- * whole and G */
-static void panel_responses(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel,
-                            Scratch *s)
-{
-    int m = panel->m;
-    if (panel->made_kind == kind && panel->made_length == h) return;
-    panel->made_kind = kind;
-    panel->made_length = h;
-    panel->inverted[0] = NAN;
-    panel->weighed = false;
-    double *less = s->waves + 4 * m;
-    for (int i = 0; i < m; i++) s->times[i] = h * tab->chi[kind * m + i];
-    for (int b = 0; b < fl->n; b++) {
-        double *there = panel->there + (size_t)4 * b * m, *home = panel->home + (size_t)4 * b * m;
-        fill_there_and_back(block_of(fl, b), s->times, m, there, home, less, s->waves);
-        fill_block_responses(fl, panel, b, there, home, less);
-        Square end = block_exponential(block_of(fl, b), h);
-        ThereAndBack swing = there_and_back(block_of(fl, b), h);
-        double whole[6] = {end.a, end.b, end.c, end.d, swing.less_a, swing.less_d};
-        memcpy(panel->whole + 6 * b, whole, sizeof whole);
-    }
-    if (!panel->many) fill_influences(fl, tab, kind, h, panel, s);
-}
 
 /* fill how a complex number of length one has turned, from a phase on, at the nodes of a panel, to
  * its own precision: real and imaginary parts (2, m); angles (m,) is scratch */
@@ -210,13 +80,15 @@ static void free_output_at_nodes(const Flow *fl, double phase, const double *w, 
 /* fill the panel's outputs at the nodes (outputs m,) without contact forces; penetrations are what
  * they were at the start of the panel, and their changes */
 static void free_outputs(const Flow *fl, const Gauss *tab, int kind, double phase, const double *w,
-                         double h, const Panel *panel, Scratch *s)
+                         double h, Panel *panel, Scratch *s)
 {
     int m = panel->m;
     fill_turns(fl, tab, kind, phase, fl->omega * h, s->times, s->waves);
     for (int o = 0; o < panel->outputs; o++)
-        free_output_at_nodes(fl, phase, w, h, panel, o, tab->chi + (size_t)kind * m, s->waves,
-                             s->step, s->free + (size_t)o * m);
+        if (is_needed(fl, panel, o))
+            free_output_at_nodes(fl, phase, w, h, panel, o, tab->chi + (size_t)kind * m, s->waves,
+                                 s->step, s->free + (size_t)o * m);
+    fill_base(fl, panel, s);
 }
 
 /* that of the one that presses a closed slider on, or -1 */
@@ -227,14 +99,14 @@ static int pressing_place(const Flow *fl, const Panel *panel, int a)
     return is_pressed(fl, s) && fl->slides[s] != 0 ? place_of(panel, (int)stop_of(fl, s)->normal) : -1;
 }
 
-/* add to rows of sliders what they have of the rows of the stops that press them on, in a matrix
- * (na m, n_columns) of how forces change by the outputs; entries of a row, and rows, lie so far
- * apart */
+/* add to rows of sliders that are sought what they have of the rows of the stops that press them
+ * on, in a matrix (na m, n_columns) of how forces change by the outputs; entries of a row, and
+ * rows, lie so far apart */
 static void add_friction(const Flow *fl, const Panel *panel, double *matrix, int n_columns,
                          size_t entry, size_t row)
 {
     int na = panel->na, m = panel->m;
-    for (int a = 0; a < na; a++) {
+    for (int a = 0; a < panel->sought; a++) {
         add_disc_friction(fl, panel, a, matrix, n_columns, entry, row);
         int normal = pressing_place(fl, panel, a);
         for (int i = 0; i < m && normal >= 0; i++) {
@@ -246,12 +118,12 @@ static void add_friction(const Flow *fl, const Panel *panel, double *matrix, int
     }
 }
 
-/* fill F from the outputs at the nodes, and its derivatives into `slope` */
+/* fill F that is sought from the outputs at the nodes, and all derivatives into `slope` */
 static void panel_forces(const Flow *fl, Panel *panel, double *slope)
 {
     int na = panel->na, m = panel->m;
-    bool rates = panel->outputs > na;
-    for (int a = 0; a < na; a++) {
+    bool rates = panel->orders > 1;
+    for (int a = 0; a < panel->sought; a++) {
         const double *delta = panel->output + (size_t)a * m;
         const double *speed = rates ? panel->output + (size_t)(na + a) * m : NULL;
         double *viscosity = rates ? slope + (size_t)(na + a) * m : NULL;
@@ -261,7 +133,7 @@ static void panel_forces(const Flow *fl, Panel *panel, double *slope)
         closed_laws(fl, panel->active[a], m, delta, speed, panel->F + (size_t)a * m,
                     slope + (size_t)a * m, viscosity);
     }
-    for (int a = 0; a < na; a++) { /* sliders that stops press on come after these */
+    for (int a = 0; a < panel->sought; a++) { /* sliders that stops press on come after these */
         int normal = pressing_place(fl, panel, a);
         for (int i = 0; i < m && normal >= 0; i++) {
             Force f = sliding_law(fl, panel->active[a], panel->output[(na + a) * m + i],
@@ -271,28 +143,32 @@ static void panel_forces(const Flow *fl, Panel *panel, double *slope)
         }
         if (disc_of(fl, panel, a) == panel->active[a]) disc_forces(fl, panel, a, slope);
     }
+    fill_following_slopes(fl, panel, slope);
 }
 
 /* fill the inverse of the matrix 1 - slope G, unless it is there: slopes of linear laws stay; what
  * depends on speeds may depend on more */
 static void invert_panel(const Flow *fl, Panel *panel)
 {
-    int width = panel->na * panel->m, height = panel->outputs * panel->m, pad = padded(width);
+    int na = panel->na, m = panel->m, width = panel->sought * m, height = panel->orders * width;
+    int pad = padded(width);
     const double *slope = panel->slope;
     bool same = height == width && !panel->round;
     for (int p = 0; p < height && same; p++) same = slope[p] == panel->inverted[p];
     if (same) return;
-    memcpy(panel->inverted, slope, sizeof(double) * height);
+    memcpy(panel->inverted, slope, sizeof(double) * width);
     for (int q = 0; q < width; q++) {
         double *restrict column = panel->inverse + (size_t)q * pad;
         const double *G = panel->G + (size_t)q * height;
         for (int p = 0; p < width; p++) column[p] = -slope[p] * G[p];
-        for (int more = width; more < height; more += width)
-            for (int p = 0; p < width; p++) column[p] -= slope[more + p] * G[more + p];
+        for (int order = 1; order < panel->orders; order++)
+            for (int p = 0; p < width; p++)
+                column[p] -= slope[order * na * m + p] * G[order * width + p];
         for (int p = width; p < pad; p++) column[p] = 0.0;
     }
-    for (int o = 0; o < panel->outputs; o++) {
-        const double *G = panel->G + o * panel->m;
+    for (int row = 0; row < panel->orders * panel->sought; row++) {
+        int o = row / panel->sought * na + row % panel->sought;
+        const double *G = panel->G + row * m;
         add_crossed(fl, panel, o, -1.0, G, height, 1, panel->inverse, pad, 1, width);
         add_tilted(fl, panel, o, -1.0, G, height, 1, panel->inverse, pad, 1, width);
     }
@@ -301,13 +177,16 @@ static void invert_panel(const Flow *fl, Panel *panel)
     invert(panel->inverse, width, panel->order);
 }
 
-/* fill the outputs at the nodes from one on: what is free and what the forces (na m,) add */
+/* fill the outputs sought at the nodes, from an order on: what is free and what the forces sought
+ * add */
 static void with_forces(const Panel *panel, const double *free, const double *force, int first,
                         double *output)
 {
-    int width = panel->na * panel->m, height = panel->outputs * panel->m;
-    combine(output + first, free + first, height - first, panel->G + first, height, force, 1,
-            width);
+    int width = panel->sought * panel->m;
+    size_t height = (size_t)panel->orders * width, stride = (size_t)panel->na * panel->m;
+    for (int order = first; order < panel->orders; order++)
+        combine(output + order * stride, free + order * stride, width,
+                panel->G + (size_t)order * width, height, force, 1, width);
 }
 
 /* fill the force that presses what slides on, by the penetrations of its stop, and its derivatives */
@@ -329,7 +208,7 @@ static void guess_rates(const Flow *fl, const Gauss *tab, int kind, double h, Pa
     int width = panel->na * panel->m, count = panel->outputs * panel->m;
     for (int p = width; p < count; p++) panel->output[p] = 0.0;
     panel_forces(fl, panel, s->new_slope);
-    with_forces(panel, s->free, panel->F, width, panel->output);
+    with_forces(panel, s->free, panel->F, 1, panel->output);
     for (int a = 0; a < panel->na; a++) {
         if (!is_let_go(fl, panel->active[a]) || is_mate(fl, panel->active[a])) continue;
         for (int round = 0; round < LEAVING; round++) {
@@ -343,7 +222,7 @@ static void guess_rates(const Flow *fl, const Gauss *tab, int kind, double h, Pa
 /* rounding error of stop a's force at node i by what all forces (na m,) have moved so far */
 static double rounded_force(const Flow *fl, const Panel *panel, const double *force, int a, int i)
 {
-    int na = panel->na, width = na * panel->m, height = panel->outputs * panel->m;
+    int na = panel->na, width = panel->sought * panel->m, height = panel->orders * width;
     double error = 0.0;
     if (panel->many) { /* without influences: by what the outputs are */
         for (int o = a; o < panel->outputs; o += na)
@@ -352,10 +231,11 @@ static double rounded_force(const Flow *fl, const Panel *panel, const double *fo
         return error;
     }
     int partner = panel->round ? partner_of(fl, panel, a) : -1;
-    for (int o = 0; o < panel->outputs; o++) {
+    for (int row = 0; row < panel->orders * panel->sought; row++) {
+        int o = row / panel->sought * na + row % panel->sought;
         if (o % na != a && o % na != partner) continue;
         double moved = 0.0;
-        const double *G = panel->G + o * panel->m + i;
+        const double *G = panel->G + row * panel->m + i;
         for (int p = 0; p < width; p++) moved += fabs(G[(size_t)p * height] * force[p]);
         double slope = o % na == a ? panel->slope[o * panel->m + i]
                                    : crossed(panel, panel->slope, o, a)[i];
@@ -369,7 +249,7 @@ static bool consistent(const Flow *fl, const Panel *panel, const double *force,
                        const double *noise)
 {
     int na = panel->na, m = panel->m;
-    for (int a = 0; a < na; a++) {
+    for (int a = 0; a < panel->sought; a++) {
         double allowed = SETTLED * largest(panel->F + (size_t)a * m, m);
         for (int o = a; o < panel->outputs; o += na)
             allowed += 10.0 * noise[o] * largest(panel->slope + (size_t)o * m, m);
@@ -393,7 +273,7 @@ static bool consistent(const Flow *fl, const Panel *panel, const double *force,
 /* take a Newton step of the forces (na m,) */
 static void step_forces(const Flow *fl, Panel *panel, Scratch *s, int iteration)
 {
-    int width = panel->na * panel->m;
+    int na = panel->na, m = panel->m, width = panel->sought * m;
     for (int p = 0; p < width; p++) {
         if (iteration > 0) {
             s->step[p] = panel->F[p] - s->solved[p];
@@ -404,13 +284,14 @@ static void step_forces(const Flow *fl, Panel *panel, Scratch *s, int iteration)
     }
     if (iteration == 0) { /* the guess is not what its forces lead to */
         with_forces(panel, s->free, s->solved, 0, s->led);
-        for (int o = 0; o < panel->outputs; o += panel->na)
+        for (int order = 0; order < panel->orders; order++)
             for (int p = 0; p < width; p++) {
-                int place = o * panel->m + p;
+                int place = order * na * m + p;
                 s->led[place] -= panel->output[place];
                 s->step[p] += panel->slope[place] * s->led[place];
             }
         for (int o = 0; o < panel->outputs; o++) {
+            if (o % na >= panel->sought || o / na >= panel->orders) continue;
             add_crossed(fl, panel, o, 1.0, s->led + o * panel->m, 0, 1, s->step, 0, 1, 1);
             add_tilted(fl, panel, o, 1.0, s->led + o * panel->m, 0, 1, s->step, 0, 1, 1);
         }
@@ -427,6 +308,7 @@ static double renew_outputs(const Flow *fl, Panel *panel, const Scratch *s, cons
     int m = panel->m;
     double change = 0.0;
     for (int o = 0; o < panel->outputs; o++) {
+        if (o % panel->na >= panel->sought || o / panel->na >= panel->orders) continue;
         double scale = 0.0, longest = 0.0, total = 0.0;
         for (int i = 0; i < m; i++) {
             double *output = panel->output + o * m + i;
@@ -460,7 +342,7 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
     free_outputs(fl, tab, kind, phase, w, h, panel, s);
     if (many) return solve_many(fl, tab, noise, panel, s);
     panel->rough = true;
-    if (panel->outputs > panel->na) guess_rates(fl, tab, kind, h, panel, s);
+    if (panel->orders > 1) guess_rates(fl, tab, kind, h, panel, s);
     bool discs = any_disc(fl, panel);
     double before = INFINITY;
     int most = discs ? MOST_TURNS : 60;
@@ -485,7 +367,10 @@ static bool solve_panel(const Flow *fl, const Gauss *tab, int kind, double phase
         double left = fresh ? change * change : change * rate / larger(1.0 - rate, SLOWEST);
         if (left <= SOLVED && !panel->rough && (fresh || before < INFINITY || change == 0.0)) {
             panel_forces(fl, panel, panel->slope);
-            if (consistent(fl, panel, s->solved, noise)) return true;
+            if (consistent(fl, panel, s->solved, noise)) {
+                fill_following(fl, panel, s);
+                return true;
+            }
             rate = 1.0; /* that estimate trusts in the order of convergence */
         }
         if (rate > STALE) panel->kept = false;

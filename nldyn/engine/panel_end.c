@@ -171,16 +171,100 @@ static bool any_drops(const Flow *fl)
 }
 
 /* fill s->last_forces of a stop with the rate and the sensitivities of its force at the end of a
- * panel, of a length h without a switch at its end: those at the nodes are in s->part (m, n_columns) */
+ * panel, of a length h without a switch at its end: those at the nodes are (m, n_columns) */
 static void fill_last_force(const Gauss *tab, int kind, double h, const Panel *panel, int a,
-                            int n_columns, Scratch *s)
+                            const double *answer, int n_columns, Scratch *s)
 {
     int m = panel->m;
     double *found = s->last_forces + (size_t)panel->active[a] * (1 + n_columns);
     found[0] = slope_at_end(tab, panel->F + (size_t)a * m) / (h * (kind == 0 ? 1.0 : tab->power));
     for (int c = 0; c < n_columns; c++) {
-        for (int i = 0; i < m; i++) s->inner[i] = s->part[i * n_columns + c];
+        for (int i = 0; i < m; i++) s->inner[i] = answer[i * n_columns + c];
         found[1 + c] = at_end(tab, s->inner);
+    }
+}
+
+/* add to rows (m, n_columns), each times a factor of its own or one, the product of a block (m, m),
+ * whose columns lie so far apart, and others (m, n_columns) */
+static void add_block(const Flow *fl, const double *block, int apart, const double *from,
+                      const double *factors, double *to, int m, int n_columns, Scratch *s)
+{
+    multiply_transposed(fl->watch, block, apart, from, s->part, m, m, n_columns);
+    for (int i = 0; i < m; i++) {
+        double factor = factors ? factors[i] : 1.0;
+        for (int c = 0; c < n_columns; c++)
+            to[i * n_columns + c] += factor * s->part[i * n_columns + c];
+    }
+}
+
+/* add to s->forces what led friction does, by numbers of its own, to the outputs of others */
+static void add_led_columns(const Flow *fl, const Gauss *tab, int kind, double h,
+                            const Panel *panel, int n_columns, Scratch *s)
+{
+    int na = panel->na, m = panel->m;
+    for (int l = panel->sought; l < na; l++) {
+        bool any = false;
+        for (int c = 0; c < fl->n_parameters; c++)
+            any = any || is_number_of(fl, c, panel->active[l]);
+        if (!any || !is_led(fl, panel, l)) continue;
+        const double *back = panel->back + (size_t)l * fl->size * m;
+        for (int o = 0; o < panel->outputs; o++) {
+            if (!is_needed(fl, panel, o)) continue;
+            bool kicks = acts_at_once(fl, panel, o, l);
+            double kick = kicks ? between(fl, panel->active[o % na], panel->active[l]) : 0.0;
+            fill_influence(fl, tab, kind, h, panel, o, back, kick, s->square, m, s->product);
+            add_block(fl, s->square, m, s->forces + (size_t)l * m * n_columns, panel->slope + o * m,
+                      s->forces + (size_t)(o % na) * m * n_columns, m, n_columns, s);
+        }
+    }
+}
+
+/* fill s->answers of what sticks without the forces sought, and let it act on s->forces of these */
+static void loosen_columns(const Flow *fl, const Panel *panel, int n_columns, Scratch *s)
+{
+    int m = panel->m, sought = panel->sought, width = panel->n_stuck * m;
+    int height = panel->orders * sought * m;
+    size_t rows = (size_t)m * n_columns;
+    for (int q = 0; q < panel->n_stuck; q++) {
+        double *answer = s->answers + panel->stuck[q] * rows;
+        memset(answer, 0, sizeof(double) * rows);
+        for (int p = 0; p < panel->n_stuck; p++)
+            add_block(fl, panel->loose + (size_t)p * m * padded(width) + q * m, padded(width),
+                      s->forces + panel->stuck[p] * rows, NULL, answer, m, n_columns, s);
+    }
+    for (int q = 0; q < panel->n_stuck; q++)
+        for (int row = 0; row < panel->orders * sought; row++) {
+            int o = row / sought * panel->na + row % sought;
+            add_block(fl, panel->reach + (size_t)q * m * height + row * m, height,
+                      s->answers + panel->stuck[q] * rows, panel->slope + o * m,
+                      s->forces + (row % sought) * rows, m, n_columns, s);
+        }
+}
+
+/* fill s->answers (na m, n_columns), the sensitivities of the forces, from what goes into them
+ * without each other, s->forces */
+static void answer_columns(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel,
+                           int n_columns, Scratch *s)
+{
+    int m = panel->m, sought = panel->sought, stuck = panel->n_stuck * m, width = sought * m;
+    size_t rows = (size_t)m * n_columns;
+    add_led_columns(fl, tab, kind, h, panel, n_columns, s);
+    loosen_columns(fl, panel, n_columns, s);
+    invert_panel(fl, panel);
+    for (int a = 0; a < sought; a++)
+        multiply_transposed(fl->watch, panel->inverse + a * m, padded(width), s->forces,
+                            s->answers + a * rows, m, width, n_columns);
+    for (int q = 0; q < panel->n_stuck; q++)
+        for (int a = 0; a < sought; a++)
+            add_block(fl, panel->share + (size_t)a * m * stuck + q * m, stuck,
+                      s->answers + a * rows, NULL, s->answers + panel->stuck[q] * rows, m,
+                      n_columns, s);
+    for (int l = sought; l < panel->na; l++) {
+        if (!is_led(fl, panel, l)) continue;
+        const double *leader = s->answers + leader_of(fl, panel, l) * rows;
+        double share = led_share(fl, panel, l);
+        for (size_t p = 0; p < rows; p++)
+            s->answers[l * rows + p] = s->forces[l * rows + p] + share * leader[p];
     }
 }
 
@@ -192,18 +276,23 @@ static void fill_last_force(const Gauss *tab, int kind, double h, const Panel *p
 static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double phase, double t0,
                           double h, Panel *panel, double *columns, int n_columns, Scratch *s)
 {
-    int na = panel->na, m = panel->m, width = na * m;
+    int na = panel->na, m = panel->m;
     bool drops = any_drops(fl);
-    memset(s->forces, 0, sizeof(double) * width * n_columns);
+    memset(s->forces, 0, sizeof(double) * na * m * n_columns);
     for (int o = 0; o < panel->outputs; o++) {
-        multiply_transposed(fl->watch, panel->to + (size_t)o * m * fl->size, m, columns, s->part,
-                            m, fl->size, n_columns);
+        bool needed = is_needed(fl, panel, o);
+        if (!needed && !(o < na && fl->n_parameters > 0)) continue;
+        if (needed)
+            multiply_transposed(fl->watch, panel->to + (size_t)o * m * fl->size, m, columns,
+                                s->part, m, fl->size, n_columns);
         for (int i = 0; i < m; i++) {
             double *forces = s->forces + (size_t)((o % na) * m + i) * n_columns;
             double slope = panel->slope[o * m + i], t = h * tab->chi[kind * m + i];
-            for (int c = 0; c < n_columns; c++) forces[c] += slope * s->part[i * n_columns + c];
+            for (int c = 0; c < n_columns && needed; c++)
+                forces[c] += slope * s->part[i * n_columns + c];
             add_node_columns(fl, phase + fl->omega * t, t0 + t, panel, o, i, n_columns, s);
         }
+        if (!needed) continue;
         add_crossed(fl, panel, o, 1.0, s->part, 1, n_columns, s->forces, 1, n_columns, n_columns);
         add_tilted(fl, panel, o, 1.0, s->part, 1, n_columns, s->forces, 1, n_columns, n_columns);
     }
@@ -211,17 +300,14 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
     if (panel->many)
         solve_columns(fl, tab, panel, n_columns, s);
     else
-        invert_panel(fl, panel);
+        answer_columns(fl, tab, kind, h, panel, n_columns, s);
     for (int a = 0; a < na; a++) {
-        if (panel->many)
-            memcpy(s->part, s->forces + (size_t)a * m * n_columns, sizeof(double) * m * n_columns);
-        else
-            multiply_transposed(fl->watch, panel->inverse + a * m, padded(width), s->forces,
-                                s->part, m, width, n_columns);
-        if (drops) fill_last_force(tab, kind, h, panel, a, n_columns, s);
+        const double *answer = (panel->many ? s->forces : s->answers) + (size_t)a * m * n_columns;
+        if (drops) fill_last_force(tab, kind, h, panel, a, answer, n_columns, s);
         for (int j = 0; j < m; j++) {
-            double *part = s->part + (size_t)j * n_columns, weight = h * tab->weights[kind * m + j];
-            for (int c = 0; c < n_columns; c++) part[c] *= weight;
+            double weight = h * tab->weights[kind * m + j];
+            for (int c = 0; c < n_columns; c++)
+                s->part[j * n_columns + c] = answer[j * n_columns + c] * weight;
         }
         take_product(fl->watch, panel->back + (size_t)a * fl->size * m, s->part, columns, fl->size,
                      m, n_columns, s->change);
@@ -240,18 +326,58 @@ static void drive_back(const Flow *fl, const Gauss *tab, const double *w, const 
         for (int i = 0; i < m; i++) s->driven[k * m + i] = w[k] + s->carried[k * m + i];
 }
 
-/* fill an output at the nodes of a panel, (m,), with the forces at work; s->driven is filled */
-static void node_outputs(const Flow *fl, const Gauss *tab, int kind, double phase, double h,
-                         const Panel *panel, int out, double *values, const Scratch *s)
+/* add to values (m,) at the nodes what a row makes of the states in s->driven */
+static void add_driven(const Flow *fl, const Panel *panel, const double *row,
+                       double *restrict values, const Scratch *s)
 {
     int m = panel->m;
-    const double *row = row_of(fl, 0, out);
-    for (int i = 0; i < m; i++)
-        values[i] = forced_output(fl, out, phase + fl->omega * h * tab->chi[kind * m + i]);
     for (int b = 0; b < fl->n; b++) {
         const double *e = panel->there + (size_t)4 * b * m, *x = s->driven + (size_t)2 * b * m;
         for (int i = 0; i < m; i++)
             values[i] += row[2 * b] * (e[i] * x[i] + e[m + i] * x[m + i]) +
                          row[2 * b + 1] * (e[2 * m + i] * x[i] + e[3 * m + i] * x[m + i]);
+    }
+}
+
+/* fill an output at the nodes of a panel, (m,), with the forces at work; s->driven is filled */
+static void node_outputs(const Flow *fl, const Gauss *tab, int kind, double phase, double h,
+                         const Panel *panel, int out, double *values, const Scratch *s)
+{
+    int m = panel->m;
+    for (int i = 0; i < m; i++)
+        values[i] = forced_output(fl, out, phase + fl->omega * h * tab->chi[kind * m + i]);
+    add_driven(fl, panel, row_of(fl, 0, out), values, s);
+}
+
+/* the same of an output o of the panel, with the turns (2, m) of the excitation from the phase on */
+static void node_course(const Flow *fl, const Gauss *tab, int kind, double phase, double h,
+                        Panel *panel, int o, const double *turns, const Scratch *s)
+{
+    int m = panel->m, out = panel->active[o % panel->na], order = o / panel->na;
+    double *values = panel->output + (size_t)o * m;
+    Complex swing = forced_of(fl, 0, 0, out);
+    if (order == 1) swing = quarter_turned(fl->omega, swing);
+    double start = product(swing, turn_at(fl, phase)).re;
+    for (int i = 0; i < m; i++) values[i] = start + swing.re * turns[i] - swing.im * turns[m + i];
+    for (int i = 0; i < m && fl->n_terms > 0; i++) {
+        Course more = swelling(fl, out, phase + fl->omega * h * tab->chi[kind * m + i]);
+        values[i] += order == 1 ? more.first : more.value;
+    }
+    add_driven(fl, panel, row_of(fl, order, out), values, s);
+}
+
+/* Fill the outputs of what follows that no equation needs: place and speed of what slides, and of
+ * the stops that press it on behind a spring. s->driven is filled. */
+static void show_following(const Flow *fl, const Gauss *tab, int kind, double phase, double h,
+                           Panel *panel, Scratch *s)
+{
+    int na = panel->na;
+    fill_turns(fl, tab, kind, phase, fl->omega * h, s->times, s->waves);
+    for (int a = panel->sought; a < na; a++) {
+        if (!is_led(fl, panel, a)) continue;
+        node_course(fl, tab, kind, phase, h, panel, a, s->waves, s);
+        node_course(fl, tab, kind, phase, h, panel, na + a, s->waves, s);
+        if (is_sprung(fl, panel->active[a]) && panel->orders == 1)
+            node_course(fl, tab, kind, phase, h, panel, na + leader_of(fl, panel, a), s->waves, s);
     }
 }

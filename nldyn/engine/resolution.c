@@ -261,7 +261,7 @@ static bool resolved(const Flow *fl, const Gauss *tab, int kind, double h, const
         for (int i = 0; i < panel->m; i++)
             s->slopes[o * panel->m + i] = panel->slope[o * panel->m + i] * stretch[i];
     fill_response_tails(fl, tab, panel, s);
-    for (int o = 0; o < panel->outputs; o++)
+    for (int o = 0; o < panel->orders * panel->na; o++)
         if (!output_resolved(fl, tab, kind, h, noise, panel, s, o)) return false;
     return true;
 }
@@ -271,6 +271,7 @@ static bool shows_decay(const Flow *fl, const Gauss *tab, int kind, double h, Pa
 {
     int na = panel->na, m = panel->m;
     bool shown = true;
+    if (panel->orders == 1) return true; /* nothing damps */
     for (int o = na; o < panel->outputs && o < 2 * na; o++) {
         int a = o - na;
         double total = 0.0, mobility = stop_of(fl, panel->active[a])->mobility;

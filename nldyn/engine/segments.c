@@ -298,7 +298,7 @@ static int touch(Motion *M, double here, int na)
     Panel *panel = M->panel;
     int stop = M->active[0], status = GOES_ON;
     double remain = M->duration - M->t;
-    if (!same_stops(panel, M->active, na)) renew_panel(fl, panel, M->active, na);
+    if (!same_stops(fl, panel, M->active, na)) renew_panel(fl, panel, M->active, na);
     if (na == (is_round(fl, stop) ? 2 : 1) && M->start_switch == 1 && is_elastic(fl, stop)) {
         bool passed = pass_touch(M, stop, here, &status);
         if (passed || status != GOES_ON) return status;

@@ -91,6 +91,14 @@ static void lay_out_panel(Block *block, const Flow *fl, int m, Panel *panel)
     panel->G = numbers(block, outputs * nodes);
     panel->inverse = numbers(block, nodes * padded((int)nodes));
     panel->order = indices(block, nodes);
+    panel->stuck = indices(block, na);
+    panel->ways = indices(block, na);
+    size_t stuck = 0;
+    for (int s = 0; s < fl->n_stops; s++) stuck += is_slider(fl, s) ? m : 0;
+    panel->reach = numbers(block, outputs * stuck);
+    panel->loose = numbers(block, stuck * padded((int)stuck));
+    panel->share = numbers(block, nodes * stuck);
+    panel->base = numbers(block, stuck);
     panel->whole = numbers(block, 3 * size);
     panel->rise = numbers(block, nodes * size);
     panel->depth = numbers(block, na);
@@ -138,6 +146,8 @@ static void lay_out_jumps(Block *block, const Flow *fl, int m, int n_columns, Sc
     size_t na = fl->n_stops, size = fl->size;
     s->forces = numbers(block, na * m * n_columns);
     s->part = numbers(block, (size_t)m * n_columns);
+    s->answers = numbers(block, na * m * n_columns);
+    s->square = numbers(block, (size_t)m * m);
     s->change = numbers(block, n_columns);
     s->last_forces = numbers(block, na * (1 + n_columns));
     if (na * m >= MANY || na * m >= (size_t)fewest_unknowns(fl)) {
