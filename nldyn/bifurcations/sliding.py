@@ -51,13 +51,7 @@ SHORTEST_STEP = 1e-6  # arclength of a step in which there may be no orbits betw
 SAME_PLACE = 1e-8  # arclength within which contacts that are alike begin to stick at once
 BESIDE = (0.0, 0.01, -0.01, 0.1, -0.1, 1.0, -1.0)  # of that: where its orbit is if none is there
 NEARLY_CLOSE = 1e-8  # the same where there are none between
-NUDGES = (
-    0.0,
-    0.1,
-    -0.1,
-    0.3,
-    1.0,
-)  # of a way: where else orbits are looked for if none is found there
+NUDGES = (0.0, 0.1, -0.1, 0.3, 1.0)  # of a way: where else orbits are looked for
 
 
 @lru_cache(maxsize=16)  # of a step both ends are asked for, by all that look into it
