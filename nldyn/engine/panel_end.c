@@ -250,6 +250,7 @@ static void answer_columns(const Flow *fl, const Gauss *tab, int kind, double h,
     size_t rows = (size_t)m * n_columns;
     add_led_columns(fl, tab, kind, h, panel, n_columns, s);
     loosen_columns(fl, panel, n_columns, s);
+    add_friction(fl, panel, s->forces, n_columns, 1, n_columns); /* of all that presses on */
     invert_panel(fl, panel);
     for (int a = 0; a < sought; a++)
         multiply_transposed(fl->watch, panel->inverse + a * m, padded(width), s->forces,
@@ -296,11 +297,12 @@ static void panel_columns(const Flow *fl, const Gauss *tab, int kind, double pha
         add_crossed(fl, panel, o, 1.0, s->part, 1, n_columns, s->forces, 1, n_columns, n_columns);
         add_tilted(fl, panel, o, 1.0, s->part, 1, n_columns, s->forces, 1, n_columns, n_columns);
     }
-    add_friction(fl, panel, s->forces, n_columns, 1, n_columns);
-    if (panel->many)
+    if (panel->many) {
+        add_friction(fl, panel, s->forces, n_columns, 1, n_columns);
         solve_columns(fl, tab, panel, n_columns, s);
-    else
+    } else {
         answer_columns(fl, tab, kind, h, panel, n_columns, s);
+    }
     for (int a = 0; a < na; a++) {
         const double *answer = (panel->many ? s->forces : s->answers) + (size_t)a * m * n_columns;
         if (drops) fill_last_force(tab, kind, h, panel, a, answer, n_columns, s);

@@ -179,6 +179,30 @@ def test_derivatives_pass_a_dashpot_that_is_hit_while_something_sticks(law):
     assert off_differences(flow, found, z, phases, 1.0, 1e-6) < 5e-6
 
 
+@pytest.mark.parametrize(
+    "other", [DryFriction("w", 3.0, 1.0, tangential_stiffness=20.0), DryFriction("w", 30.0, 1.0)]
+)
+@pytest.mark.parametrize("seed", [0, 4])
+def test_derivatives_pass_friction_that_fades_beside_what_sticks(seed, other):
+    """What sticks moves the stop, and with it what presses on the slider."""
+    rng, n, names = np.random.default_rng(seed), 4, "xyzw"
+    A, B = rng.normal(size=(n, n)), 0.3 * rng.normal(size=(n, n))
+    M, K = np.eye(n) + B @ B.T, A @ A.T + np.eye(n)
+    forces, phases = 3.0 * rng.random(n), rng.uniform(0.0, 360.0, n)
+    system = System.from_matrices(
+        M, K, dict(zip(names, np.eye(n), strict=True)), damping=0.05 * K,
+        stops=[Stop("x", 60.0, 1.0, 0.05, tangent="y", friction=Friction(0.3, 0.5, 0.2))],
+        dampers=[other],
+        excitation=[HarmonicForce(*row) for row in zip(names, forces, phases, strict=True)],
+    )  # fmt: skip
+    flow, turns = FlowMap(system), np.array([0.0, 2.2 * math.pi])
+    z = flow.to_state(0.3 * rng.normal(size=2 * n))[None]
+    found = flow.shoot(z, turns, 1.3)
+    assert found.failure == "" and found.closings[0] > 0
+    steps = (1e-5, 1e-6)
+    assert min(off_differences(flow, found, z, turns, 1.3, step) for step in steps) < 1e-6
+
+
 @pytest.mark.parametrize("speed", [1e-1, 1e-3, 1e-4])
 @pytest.mark.parametrize("drop", [0.0, 0.1])
 def test_derivatives_by_a_slow_touch_that_lets_something_slip_are_in_closed_form(drop, speed):
