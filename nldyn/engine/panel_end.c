@@ -215,6 +215,7 @@ static void add_led_columns(const Flow *fl, const Gauss *tab, int kind, double h
             fill_influence(fl, tab, kind, h, panel, o, back, kick, s->square, m, s->product);
             add_block(fl, s->square, m, s->forces + (size_t)l * m * n_columns, panel->slope + o * m,
                       s->forces + (size_t)(o % na) * m * n_columns, m, n_columns, s);
+            add_tilted(fl, panel, o, 1.0, s->part, 1, n_columns, s->forces, 1, n_columns, n_columns);
         }
     }
 }
@@ -238,6 +239,7 @@ static void loosen_columns(const Flow *fl, const Panel *panel, int n_columns, Sc
             add_block(fl, panel->reach + (size_t)q * m * height + row * m, height,
                       s->answers + panel->stuck[q] * rows, panel->slope + o * m,
                       s->forces + (row % sought) * rows, m, n_columns, s);
+            add_tilted(fl, panel, o, 1.0, s->part, 1, n_columns, s->forces, 1, n_columns, n_columns);
         }
 }
 

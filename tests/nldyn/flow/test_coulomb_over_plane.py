@@ -205,3 +205,25 @@ def test_derivatives_by_numbers_are_those_of_differences(name):
 def test_a_coefficient_that_changes_is_refused_in_a_sentence():
     with pytest.raises(SystemModelError, match="with a second_tangent has one coefficient"):
         DryFriction("x", 1.0, Friction(0.3, 0.4, 0.1), second_tangent="y")
+
+
+@pytest.mark.parametrize("seed", [0, 4])
+def test_derivatives_pass_sliding_over_one_plane_beside_rest_on_another(seed):
+    rng, n, names = np.random.default_rng(seed), 5, "xyzuv"
+    A, B = rng.normal(size=(n, n)), 0.3 * rng.normal(size=(n, n))
+    M, K = np.eye(n) + B @ B.T, A @ A.T + np.eye(n)
+    forces, phases = 3.0 * rng.random(n), rng.uniform(0.0, 360.0, n)
+    dampers = [
+        DryFriction("x", 0.5, 1.0, second_tangent="y"),
+        DryFriction("z", 2.5, 1.0, second_tangent="u"),
+    ]
+    system = System.from_matrices(
+        M, K, dict(zip(names, np.eye(n), strict=True)), damping=0.05 * K, dampers=dampers,
+        excitation=[HarmonicForce(*row) for row in zip(names, forces, phases, strict=True)],
+    )  # fmt: skip
+    flow, turns = FlowMap(system), np.array([0.0, 0.6 * np.pi])
+    z = flow.to_state(0.3 * rng.normal(size=2 * n))[None]
+    found = flow.shoot(z, turns, 1.3)
+    assert found.failure == ""
+    steps = (1e-5, 1e-6)
+    assert min(off_differences(flow, found, z, turns, 1.3, step) for step in steps) < 1e-6
