@@ -137,7 +137,9 @@ def amplitude(omega):
     return 1.0 / abs(1.0 + SPRING - omega**2 + 1j * DAMPING * omega)
 
 
-@pytest.mark.parametrize("start", [0.25, 0.1, 0.6])  # sliding, and sticking on both sides
+@pytest.mark.parametrize(  # sliding, and sticking on both sides
+    "start", [0.25, *(pytest.param(hz, marks=pytest.mark.slow) for hz in (0.1, 0.6))]
+)
 def test_jenkins_element_begins_to_slide_where_its_spring_pulls_with_its_friction(start):
     system = block(1.0, damping=DAMPING, spring=SPRING)
     branch = continue_branch(solve_orbit(system, start), (0.05, 0.8))
@@ -385,7 +387,7 @@ def off(special, body):
         (pressed(), 0.202, (0.195, 0.203), ["GS", "GS"]),
         (pressed(), 0.142, (0.1405, 0.1425), ["CS", "CS"]),
         (pressed(40.0), 0.19, (0.187, 0.192), ["CS"]),
-        (rubbed(), 0.1, (0.02, 0.14), ["AS", "CS"]),
+        pytest.param(rubbed(), 0.1, (0.02, 0.14), ["AS", "CS"], marks=pytest.mark.slow),
         (rubbed(3.0), 0.1, (0.08, 0.14), ["AS"]),
     ],
 )

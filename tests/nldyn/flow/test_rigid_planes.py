@@ -188,7 +188,7 @@ def test_two_stops_at_once_are_each_as_alone():
         assert min(friction.stuck, friction.slid, friction.open) > 0.01
 
 
-@pytest.mark.parametrize("link", [0.1, 0.4])
+@pytest.mark.parametrize("link", [0.1, pytest.param(0.4, marks=pytest.mark.slow)])
 def test_derivatives_of_two_stops_at_once_are_those_of_differences(link):
     system, *_ = two_at_once(link)
     flow, phases = FlowMap(system), np.array([0.0, 1.5 * TURN])
