@@ -120,9 +120,7 @@ def rigid_impacts(motion: Trajectory, stop: int) -> RigidImpacts:
     after = 1 + np.flatnonzero(np.isin(rec.event[:-1], list(flow.system.rigid_stops)))
     if not after.size:
         none, sides = np.empty(0), np.empty((0, 1))
-        return RigidImpacts(
-            after, none, none, none, none, sides, sides, sides, np.empty((0, 2, 2))
-        )
+        return RigidImpacts(after, none, none, none, none, sides, sides, sides, np.empty((0, 2, 2)))
     before, behind = (
         course(flow, stop, states) for states in (states_before(motion, after), rec.start[after])
     )

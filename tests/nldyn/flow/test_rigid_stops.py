@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from nldyn import (
     BaseMotion,
     ConstantForce,
+    ConvergenceError,
     Damper,
     FlowMap,
     HarmonicForce,
@@ -22,8 +23,10 @@ from nldyn import (
     Stop,
     System,
     SystemModelError,
+    continue_branch,
     impacts,
     simulate,
+    solve_orbit,
 )
 from nldyn.orbits.starts import random_states
 from nldyn.system import CubicDamper
@@ -489,3 +492,22 @@ def test_random_states_lie_in_front_of_all_rigid_stops():
     a = states[:, :2] @ system.participation["a"]
     assert np.all((a <= 1.0 + 1e-8) & (a >= -2.0 - 1e-8))
     assert np.ptp(a) > 1.0 and np.ptp(states[:, 2:]) > 0.0
+
+
+def test_a_motion_behind_a_rigid_stop_is_no_orbit():
+    """The free motion swings about 2 m, far behind the stop, which it never meets from there."""
+    free = System.from_matrices(
+        np.eye(2), np.eye(2), {"z": [1.0, 0.0], "x": [0.0, 1.0]}, damping=0.1 * np.eye(2),
+        excitation=[ConstantForce("z", 2.0), HarmonicForce("x", 0.3)],
+    )  # fmt: skip
+    beyond = solve_orbit(free, 0.15).states([0.0])[0]
+    system = free.with_elements(stops=[RigidStop("z", 0.5, gap=0.1)])
+    with pytest.raises(ConvergenceError, match="behind a rigid stop"):
+        solve_orbit(system, 0.15, guess=beyond)
+    swings = free.with_elements(excitation=[ConstantForce("z", 2.0), HarmonicForce("z", 0.3)])
+    along = solve_orbit(swings.with_elements(stops=[RigidStop("z", 0.5, gap=3.0)]), 0.15)
+    branch = continue_branch(along, (1.0, 3.0), parameter=Parameter("gap", 0))
+    nodes = [orbit.states(np.linspace(0.0, 2.0 * np.pi, 20))[:, 0] for orbit in branch.points]
+    gaps = [orbit.system.rigid_stops[0].gap for orbit in branch.points]
+    assert len(gaps) > 3
+    assert max(z.max() - gap for z, gap in zip(nodes, gaps, strict=True)) < 1e-6

@@ -105,7 +105,7 @@ def test_its_numbers_may_change(tmp_path, key, parameter):
         (('law = "linear"', 'law = "linear"\nexponent = 2.0'), "exponent"),
         (RIGID, "stiffness.*law 'rigid'"),
         (('law = "linear"', 'law = "rigid"'), "stiffness.*law 'rigid'"),
-        (('law = "linear"', 'restitution = 0.5'), "which is for law 'rigid'"),
+        (('law = "linear"', "restitution = 0.5"), "which is for law 'rigid'"),
         (("stiffness = 2e6", ""), "needs a 'stiffness', or the law 'rigid'"),
         (('law = "linear"', 'law = "linear"\ngap = 2.0'), "gap"),
     ],
