@@ -78,6 +78,8 @@ def _limit(ways: Real, values: Real) -> float | None:
         places.append(int(longer[-1]))
     a, b, c = np.log(ways[places])
     x, y = values[places[:2]]
+    if x == y:
+        return None
     sense = np.sign(x - y)
 
     def off(beyond: float) -> float:

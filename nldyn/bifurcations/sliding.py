@@ -178,9 +178,9 @@ def sliding_points_between(a: BranchNode, b: BranchNode) -> tuple[list[SpecialPo
             if within is not None:
                 found.append(within)
                 continue
-            place = told_value(a.parameter, *sorted((a.value, b.value)), digits=8)
+            place = told_value(a.parameter, 0.5 * (a.value + b.value), digits=8)
             name = slider_name(a.orbit.system, number)
-            notes.append(f"{name}: it begins or ceases to stick between {place}: {error}")
+            notes.append(f"{name}: it begins or ceases to stick near {place}: {error}")
     found.sort(key=lambda s: s.point.arclength, reverse=bool(b.arclength < a.arclength))
     return _at_once(found), notes
 
