@@ -114,20 +114,31 @@ def true_crossing(place: Place, longest: float = math.inf) -> Solved | None:
 
 
 def without_repeats(found: list[SpecialPoint]) -> list[SpecialPoint]:
-    """Of neighbouring branch points where one branch turns, only the one nearest to the turn.
+    """Special points without those that rounding adds.
+
+    Of neighbouring branch points where one branch turns, only the one nearest to the turn is kept.
 
     A branch that turns where it meets another one has a multiplier that touches 1 there without
     passing it, so that rounding decides how often the branch point's test changes sign. The turn is
-    no fold.
+    no fold. Where the parameter only stands still, rounding makes two folds at one value, and there
+    is none.
     """
     kept: list[SpecialPoint] = []
     for special in found:
-        if kept and _turns_twice(kept[-1], special):
+        if kept and _stands_still(kept[-1], special):
+            kept.pop()
+        elif kept and _turns_twice(kept[-1], special):
             crossings = [s for s in (kept[-1], special) if s.kind == "BP"]
             kept[-1] = min(crossings, key=_pace)
         else:
             kept.append(special)
     return kept
+
+
+def _stands_still(a: SpecialPoint, b: SpecialPoint) -> bool:
+    """Whether two folds are a place where the parameter, to their errors, does not turn."""
+    folds = a.kind == b.kind == "LP" and distance(a.point, b.point) < NEIGHBOUR
+    return folds and abs(a.value - b.value) <= a.error + b.error
 
 
 def _turns_twice(a: SpecialPoint, b: SpecialPoint) -> bool:

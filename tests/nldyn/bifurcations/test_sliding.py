@@ -80,8 +80,11 @@ def test_stops_begin_over_frequency_where_den_hartog_says():
 @pytest.mark.parametrize("ratio", [0.6, 0.8, 1.25])
 def test_stops_begin_over_friction_where_den_hartog_says(ratio):
     start = solve_orbit(block(0.5), ratio / TURN)
-    (special,) = sliding_points(continue_branch(start, (0.4, 0.97), parameter="friction"))
+    branch = continue_branch(start, (0.4, 0.97), parameter="friction")
+    (special,) = sliding_points(branch)
     assert special.kind == "CS"
+    assert np.all(np.diff(branch.values) > 0.0)  # where a multiplier touches 1 nothing turns
+    assert "LP" not in {mark.kind for mark in branch.special_points}
     assert special.value == pytest.approx(limit(ratio), rel=1e-9)
 
 
