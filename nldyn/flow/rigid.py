@@ -18,16 +18,13 @@ BEHIND = 1e-9  # of them: depth of a state that lies behind a rigid stop
 STILL = 1e-9  # of the largest speed at a stop: one that counts as none
 
 
-def behind_rigid_stops(flow: FlowMap, states: Real, share: float = BEHIND) -> NDArray[np.bool_]:
-    """Which of the states z (k, 2n) lie behind a rigid stop, where no motion can begin.
-
-    They do if they are deeper than a share of the largest displacement that their modes allow.
-    """
+def behind_rigid_stops(flow: FlowMap, states: Real) -> NDArray[np.bool_]:
+    """Which of the states z (k, 2n) lie behind a rigid stop, where no motion can begin."""
     behind = np.zeros(len(states), dtype=bool)
     for i, stop in flow.system.rigid_stops.items():
         rows = flow.rows[flow.round_rows.get(i, [i])]
         size = (np.abs(states) @ np.abs(rows).T).sum(axis=1) + stop.reach
-        behind |= flow.outputs_at(i, states) - stop.gap > share * size
+        behind |= flow.outputs_at(i, states) - stop.gap > BEHIND * size
     return behind
 
 

@@ -692,8 +692,7 @@ def _bordered(
             if not step < 2.0:
                 raise ConvergenceError("Newton's method diverged")
             if step <= CONVERGED or (step < ROUNDING and step > STAGNANT * before):
-                at = family.at(point)
-                found = Corrected(at, condition, step, iteration, at.problem.impossible(at.nodes))
+                found = Corrected(family.at(point), condition, step, iteration, "")
                 if found.residual(condition) < SATISFIED:
                     return found
         except FAILURES as error:

@@ -11,12 +11,14 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import ConvergenceError, SystemModelError, numbers
 from nldyn.flow.flow_map import FlowMap, Trajectory
 from nldyn.orbits.orbit import Orbit, minimal_period
+from nldyn.orbits.self_excited import samples
 from nldyn.orbits.shooting import ShootingProblem
 from nldyn.system.system import NOT_HELD, System
 
 # contact force over the excitation, and penetration over displacement, up to which a free body
 # counts as untouched
 TOUCH = 1e-7
+TOO_DEEP = 1e-6  # depth behind a rigid stop, as a share of the motion there, that is no rounding
 TOUCH_ONE = "give a guess that touches one"
 NO_PLACE = (
     "the structure is free to move as a whole, and where the motion touches no stop, nothing tells "
@@ -111,7 +113,23 @@ def refine(
             f"iteration{'' if found.iterations == 1 else 's'}; another guess or find_orbits may "
             f"find one{', or continue_branch from calm motion' if problem.period == 1 else ''}"
         )
+    if _behind_a_rigid_stop(found.motion):
+        raise ConvergenceError(
+            f"{where}: Newton's method came to a motion behind a rigid stop, which it never meets; "
+            "give a guess in front of it"
+        )
     return Orbit.of(problem, found, observe)
+
+
+def _behind_a_rigid_stop(motion: Trajectory) -> bool:
+    """Whether a motion is where none can be: what begins behind a rigid stop never meets it."""
+    flow, states = motion.flow, samples(motion)
+    for i, stop in flow.system.rigid_stops.items():
+        outputs = flow.outputs_at(i, states)
+        size = float(np.abs(outputs).max()) + stop.reach
+        if outputs.max() - stop.gap > TOO_DEEP * size:
+            return True
+    return False
 
 
 def spread(problem: ShootingProblem, start: Real, omega: float) -> Real:

@@ -16,7 +16,6 @@ from nldyn.base.arrays import Real
 from nldyn.base.errors import SystemModelError, check_whole
 from nldyn.engine.newton import Corrector
 from nldyn.flow.flow_map import FlowMap, Solution, Trajectory, pinned
-from nldyn.flow.rigid import behind_rigid_stops
 
 SEGMENTS_PER_PERIOD = 2
 LONGEST_PERIOD = 10**4  # excitation periods of an orbit
@@ -27,7 +26,6 @@ ITERATIONS = 12  # most Newton steps
 LONGEST = 1e3  # relative length of a first Newton step
 FROM_NEAR = 8  # the same from a point that was predicted or nearly found: more mean it went astray
 LOOSE = 1e-3  # relative length of a last step from which on nothing shows that there is an orbit
-TOO_DEEP = 1e-6  # depth behind a rigid stop, as a share of its motion, that is no rounding
 AT_REST = 1e-6  # size of an orbit, relative to the guess, that may be rounding
 MUCH_SMALLER = 0.1  # of the start: an orbit whose steps are to be judged anew
 BROKEN = 1e-8  # asymmetry of an orbit that is more than rounding
@@ -141,17 +139,7 @@ class ShootingProblem:
         if found.converged and found.last_step > LOOSE:
             largest = float(np.abs(found.jacobians).max())
             return found._replace(failure=f"Jacobians of {largest:.1e} make too much of rounding")
-        if found.converged:
-            return found._replace(failure=self.impossible(self.nodes(found.point)))
         return found
-
-    def impossible(self, nodes: Real) -> str:
-        """Why a solution of the equations, by its states (k, 2n), is no motion; or nothing.
-
-        What begins behind a rigid stop never meets it.
-        """
-        behind = behind_rigid_stops(self.flow, nodes, TOO_DEEP)
-        return "Newton's method came to a motion behind a rigid stop" if behind.any() else ""
 
     def tangent(self, found: Solution, towards: Real) -> Real:
         """Unit tangent of the branch at a solution, on the side of the vector `towards`."""
