@@ -254,7 +254,8 @@ class Touches:
                 coordinate=here.coordinate + float(step[hit.size * (n + 1)]),
             )  # fmt: skip
             amounts = amounts + np.insert(step[hit.size * (n + 1) + 1 :], lead, 0.0)
-            if not np.abs(here.states - self.states).max() < self.size:
+            near = 0.5 < here.omega / self.omega < 2.0
+            if not near or not np.abs(here.states - self.states).max() < self.size:
                 break
             if np.abs(moves[:, :n]).max() < SMALL * self.size:
                 return here, amounts
