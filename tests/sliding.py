@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -9,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import OdeSolution, solve_ivp
 
+from nldyn import FlowMap, System
+from nldyn.flow.flow_map import Segments
 from nldyn.system import Friction
 
 Vector = NDArray[np.float64]
+GRAVITY = 9.81
 FIRST_STEP = 1e-9  # beside springs: behind an event, which another one may follow at once
 ROUNDED = 1.0 + 1e-12  # times its friction: what slips no more than a rounding before
 
@@ -336,3 +340,30 @@ def monodromy(orbit):
         for step in 1e-6 * np.eye(node.size)
     ]  # fmt: skip
     return np.array(columns).T
+
+
+def flown(system: System, start: object, time: float, **more: bool) -> tuple[Vector, Segments]:
+    """Displacements and speeds after a time, and what the flow map says."""
+    flow = FlowMap(system)
+    z = flow.to_state(np.asarray(start, dtype=float))[None]
+    turn = 2.0 * math.pi
+    found = flow.shoot(z, np.array([0.0, turn]), turn / time, **more)
+    return flow.to_modal(found.ends)[0], found
+
+
+def thrown(
+    height: float, slip: float, restitution: float, friction: float, time: float
+) -> tuple[float, float]:
+    """Way and speed along a floor of what is thrown over it: it bounces, then slides to rest."""
+    t = math.sqrt(2.0 * height / GRAVITY)
+    x, speed = slip * min(t, time), GRAVITY * t
+    for _ in range(300):
+        if t >= time:
+            return x, slip
+        slip = max(slip - friction * (1.0 + restitution) * speed, 0.0)
+        speed *= restitution
+        flight = 2.0 * speed / GRAVITY
+        x += slip * min(flight, time - t)
+        t += flight
+    left = min(time - t, slip / (friction * GRAVITY))
+    return x + slip * left - 0.5 * friction * GRAVITY * left**2, slip - friction * GRAVITY * left

@@ -118,38 +118,38 @@ static void fill_influence(const Flow *fl, const Gauss *tab, int kind, double h,
     for (int i = 0; i < m && kick != 0.0; i++) G[i * apart + i] -= kick;
 }
 
+/* the influences of what acts at a, drawn by `back`, on what is sought and on what sticks */
+static void fill_influences_of(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel,
+                               int a, const double *back, double *onto, double *onto_stuck,
+                               size_t stuck_apart, Scratch *s)
+{
+    int m = panel->m, sought = panel->sought;
+    size_t height = (size_t)panel->orders * sought * m;
+    for (int row = 0; row < panel->orders * sought; row++) {
+        int o = row / sought * panel->na + row % sought;
+        fill_influence(fl, tab, kind, h, panel, o, back, kick_of(fl, panel, o, a), onto + row * m,
+                       height, s->product);
+    }
+    for (int p = 0; p < panel->n_stuck; p++)
+        fill_influence(fl, tab, kind, h, panel, panel->stuck[p], back,
+                       kick_of(fl, panel, panel->stuck[p], a), onto_stuck + p * m, stuck_apart,
+                       s->product);
+}
+
 /* fill G from `to` and `back`, without what follows */
 static void fill_influences(const Flow *fl, const Gauss *tab, int kind, double h, Panel *panel,
                             Scratch *s)
 {
-    int m = panel->m, sought = panel->sought, n_stuck = panel->n_stuck;
-    size_t height = (size_t)panel->orders * sought * m, width = (size_t)n_stuck * m;
-    for (int a = 0; a < sought; a++) {
-        const double *back = drawn(fl, panel, a, s->driven);
-        for (int row = 0; row < panel->orders * sought; row++) {
-            int o = row / sought * panel->na + row % sought;
-            fill_influence(fl, tab, kind, h, panel, o, back, kick_of(fl, panel, o, a),
-                           panel->G + a * m * height + row * m, height, s->product);
-        }
-        for (int q = 0; q < n_stuck; q++)
-            fill_influence(fl, tab, kind, h, panel, panel->stuck[q], back,
-                           kick_of(fl, panel, panel->stuck[q], a),
-                           panel->share + a * m * width + q * m, width, s->product);
-    }
-    for (int q = 0; q < n_stuck; q++) {
-        int a = panel->stuck[q];
-        const double *back = panel->back + (size_t)a * fl->size * m;
-        for (int row = 0; row < panel->orders * sought; row++) {
-            int o = row / sought * panel->na + row % sought;
-            fill_influence(fl, tab, kind, h, panel, o, back, kick_of(fl, panel, o, a),
-                           panel->reach + q * m * height + row * m, height, s->product);
-        }
-        for (int p = 0; p < n_stuck; p++)
-            fill_influence(fl, tab, kind, h, panel, panel->stuck[p], back,
-                           kick_of(fl, panel, panel->stuck[p], a),
-                           panel->loose + q * m * padded((int)width) + p * m,
-                           padded((int)width), s->product);
-    }
+    int m = panel->m, n_stuck = panel->n_stuck;
+    size_t height = (size_t)panel->orders * panel->sought * m, width = (size_t)n_stuck * m;
+    size_t apart = padded((int)width);
+    for (int a = 0; a < panel->sought; a++)
+        fill_influences_of(fl, tab, kind, h, panel, a, drawn(fl, panel, a, s->driven),
+                           panel->G + a * m * height, panel->share + a * m * width, width, s);
+    for (int q = 0; q < n_stuck; q++)
+        fill_influences_of(fl, tab, kind, h, panel, panel->stuck[q],
+                           panel->back + (size_t)panel->stuck[q] * fl->size * m,
+                           panel->reach + q * m * height, panel->loose + q * m * apart, apart, s);
     take_stuck_out(fl, panel, s);
 }
 

@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rigid_friction import RubbingWalls, UndecidedError, Wall
+from sliding import GRAVITY as G
+from sliding import flown, thrown
 
 from nldyn import (
     ConstantForce,
@@ -28,7 +30,6 @@ from nldyn.flow.sliding import slider_measures
 from nldyn.system import Friction
 from nldyn.system.chart import value_of
 
-G = 9.81
 TURN = 2.0 * math.pi
 
 
@@ -41,30 +42,6 @@ def block(restitution, friction, push=0.0, **law):
         np.eye(2), np.zeros((2, 2)), {"x": [1.0, 0.0], "y": [0.0, 1.0]}, stops=[stop],
         excitation=loads,
     )  # fmt: skip
-
-
-def flown(system, start, time, **more):
-    """Displacements and speeds after a time, and what the flow map says."""
-    flow = FlowMap(system)
-    z = flow.to_state(np.asarray(start, dtype=float))[None]
-    found = flow.shoot(z, np.array([0.0, TURN]), TURN / time, **more)
-    return flow.to_modal(found.ends)[0], found
-
-
-def thrown(height, slip, restitution, friction, time):
-    """Place and speed along the table of a block thrown over it: it bounces, then rests."""
-    t = math.sqrt(2.0 * height / G)
-    x, speed = slip * min(t, time), G * t
-    for _ in range(300):
-        if t >= time:
-            return x, slip
-        slip = max(slip - friction * (1.0 + restitution) * speed, 0.0)
-        speed *= restitution
-        flight = 2.0 * speed / G
-        x += slip * min(flight, time - t)
-        t += flight
-    left = min(time - t, slip / (friction * G))
-    return x + slip * left - 0.5 * friction * G * left**2, slip - friction * G * left
 
 
 @pytest.mark.parametrize("time", [0.2, 0.4, 0.8, 1.1, 2.0, 6.0])

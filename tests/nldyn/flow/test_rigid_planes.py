@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rigid_plane import Body, UndecidedError
-from sliding import off_differences
+from sliding import GRAVITY as G
+from sliding import flown, off_differences, thrown
 
 from nldyn import (
     ConstantForce,
@@ -28,7 +29,6 @@ from nldyn.flow.sliding import slider_measures
 from nldyn.system import DryFriction, Friction
 from nldyn.system.chart import value_of, with_value
 
-G = 9.81
 TURN = 2.0 * math.pi
 ANGLE = np.array([math.cos(0.7), math.sin(0.7)])
 
@@ -44,30 +44,6 @@ def puck(restitution, friction, push=(0.0, 0.0), **law):
         np.eye(3), np.zeros((3, 3)), dict(zip("xyz", np.eye(3), strict=True)), stops=[stop],
         excitation=[ConstantForce("z", -G), *pushed],
     )  # fmt: skip
-
-
-def flown(system, start, time, **more):
-    """Displacements and speeds after a time, and what the flow map says."""
-    flow = FlowMap(system)
-    z = flow.to_state(np.asarray(start, dtype=float))[None]
-    found = flow.shoot(z, np.array([0.0, TURN]), TURN / time, **more)
-    return flow.to_modal(found.ends)[0], found
-
-
-def thrown(height, slip, restitution, friction, time):
-    """Way and speed along the floor of a puck thrown over it: it bounces, then slides to rest."""
-    t = math.sqrt(2.0 * height / G)
-    x, speed = slip * min(t, time), G * t
-    for _ in range(300):
-        if t >= time:
-            return x, slip
-        slip = max(slip - friction * (1.0 + restitution) * speed, 0.0)
-        speed *= restitution
-        flight = 2.0 * speed / G
-        x += slip * min(flight, time - t)
-        t += flight
-    left = min(time - t, slip / (friction * G))
-    return x + slip * left - 0.5 * friction * G * left**2, slip - friction * G * left
 
 
 @pytest.mark.parametrize("time", [0.2, 0.4, 0.8, 1.1, 2.0, 6.0])
